@@ -35,7 +35,7 @@ from psdmc.derivation.derive import derive_model
 from psdmc.lower.admitted import wanted
 from psdmc.lower.kernels import lower
 from psdmc.model.random_states import states_of
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.load import load_robot
 from psdmc.robot.mechanism import Array, Placement
 from psdmc.target.target import GCC_ONLY
@@ -112,13 +112,13 @@ def _palletiser() -> list[float]:
             f"{one.first.joint + 1} {one.second.joint + 1} {_place(one.first.placement)} {_place(one.second.placement)}"
             for one in tree.loops
         ]
-        following = Following.of(robot.coordinates, robot.types)
+        mimic_map = MimicMap.of(robot.coordinates, robot.types)
         lines = [robot_as_numbers(tree), str(len(ends)), *ends, f"{robot.nv} {STATES} {ROUNDS}"]
-        lines.append(_row(following.ratios.ravel()))
+        lines.append(_row(mimic_map.ratios.ravel()))
         q, qd, tau = states_of(robot, np.random.default_rng(SEED), STATES)
         motors = np.zeros((STATES, tree.nv))
         motors[:, list(robot.own_joints)] = tau
-        states = (q, qd, tau, following.positions(q), following.rates(qd), motors)
+        states = (q, qd, tau, mimic_map.positions(q), mimic_map.rates(qd), motors)
         lines += [_row(*row) for row in zip(*states, strict=True)]
         (found,) = _printed(program, lines, folder)
     return found

@@ -25,7 +25,7 @@ from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import model_of
 from psdmc.real_arrays import real_array
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.joints.quaternion import inverse, rotation_of
 from psdmc.robot.joints.scalars import unit
 from psdmc.robot.limits import shown
@@ -53,7 +53,7 @@ def to_qpos(model: DynamicsModel | str | Path, q: ArrayLike, mj_model: Any = Non
     """
     layout = _Layout.of("to_qpos", model, mj_model)
     values = layout.checked("q", q, layout.nq)
-    values = layout.following.positions(values) if layout.following else values
+    values = layout.mimic_map.positions(values) if layout.mimic_map else values
     found = np.broadcast_to(layout.rest, (*values.shape[:-1], len(layout.rest))).copy()
     found[..., layout.places] = values
     return found
@@ -78,7 +78,7 @@ def to_qvel(model: DynamicsModel | str | Path, q: ArrayLike, qd: ArrayLike, mj_m
     """
     layout = _Layout.of("to_qvel", model, mj_model)
     rates = layout.checked("qd", qd, layout.nv)
-    rates = layout.following.rates(rates) if layout.following else rates
+    rates = layout.mimic_map.rates(rates) if layout.mimic_map else rates
     here, rates = layout.broadcast(layout.checked("q", q, layout.nq), rates, "qd")
     found = np.zeros((*rates.shape[:-1], layout.rates))
     found[..., layout.speeds] = layout.turned(here, rates, back=False)
@@ -105,7 +105,7 @@ class _Layout:
     """Where MuJoCo has what the joints of a model have.
 
     what        the function that is called, for errors
-    following   how all joints move with the model's coordinates; None where each has its own
+    mimic_map   how all joints move with the model's coordinates; None where each has its own
     rest        (nq of MuJoCo,) positions of joints that the model has not
     rates       nv of MuJoCo
     places      of all joints' coordinates, and
@@ -116,7 +116,7 @@ class _Layout:
     """
 
     what: str
-    following: Following | None
+    mimic_map: MimicMap | None
     rest: Array
     rates: int
     places: NDArray[np.intp]
@@ -141,7 +141,7 @@ class _Layout:
         orders = [OF_QUATERNION.get(kind, (0,)) for kind in kinds]
         return _Layout(
             what,
-            Following.of(chain.coordinates, chain.types) if chain.has_followers else None,
+            MimicMap.of(chain.coordinates, chain.types) if chain.has_mimic_joints else None,
             rest,
             rates,
             _joined(int(start) + k for start, order in zip(at, orders, strict=True) for k in order),

@@ -2,7 +2,7 @@
 precision, which is what rounding errors of 1e-13 are measured against.
 
 Each body's motion in the root's axes about its centre of mass, projected by Jacobians (Kane): no code and no formula shared
-with psdmc's recursions, nor with Pinocchio's. Joints that turn or slide, mimic joints, fixed links, a free root.
+with psdmc's recursions, nor with Pinocchio's. Joints that turn or slide, mimic joints, fixed links, a floating base.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 Array = np.ndarray
 GRAVITY = 9.81
 ROOT_Q, ROOT_V = 7, 6
-"""Of a free root: position and quaternion xyzw; linear and angular velocity along its own axes."""
+"""Of a floating base: position and quaternion xyzw; linear and angular velocity along its own axes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Body:
 
 class ExtendedTree:
     """order  names of the joints in the order in which states have the coordinates of those that follow no other, behind
-    those of a free root"""
+    those of a floating base"""
 
     def __init__(self, text: str, order: Sequence[str], is_floating: bool = False) -> None:
         robot = xml.fromstring(text)

@@ -22,7 +22,7 @@ FOOT = (
 
 
 def as_urdf(tree: RandomTree, coordinates: Sequence[Coordinate]) -> str:
-    """The tree with its followers as mimic joints, numbers to all their digits."""
+    """The tree with its mimic joints, numbers to all their digits."""
 
     def words(values) -> str:
         return " ".join(repr(float(value)) for value in values)

@@ -28,7 +28,7 @@ def facts(info: PackageInfo, options: EmitOptions) -> tuple[str, ...]:
         "",
         "Joints, each behind those that carry it:" if info.is_tree else "Joints, from base to tip:",
         *(f"  {i}  {line}" for i, line in enumerate(_joints(info))),
-        *(f"     {sentence}" for sentence in info.followers),
+        *(f"     {sentence}" for sentence in info.mimic_joints),
         "",
         "theta_b, base parameters in standard parameters about the file's link frames:",
         *(f"  {i}  {parameter.equation}  [{parameter.unit}]" for i, parameter in enumerate(info.parameters)),

@@ -96,7 +96,7 @@ class PackageInfo:
     q_names     names of the nq entries of q, untrusted text
     v_names     names of the nv entries of rates and torques
     base_frame  in words, the frame in which gravity, frames and velocities are given
-    followers   sentences about mimic joints, untrusted text; mimic joints are not among `joints`
+    mimic_joints sentences about mimic joints, untrusted text; mimic joints are not among `joints`
     """
 
     name: str
@@ -112,7 +112,7 @@ class PackageInfo:
     contacts: tuple[tuple[str, int], ...] = ()
     loops: tuple[tuple[str, tuple[int, ...]], ...] = ()
     payload: tuple[Array, ...] = ()
-    followers: tuple[str, ...] = ()
+    mimic_joints: tuple[str, ...] = ()
     units: tuple[tuple[int, int], ...] = ()
     friction: Friction | None = None
     in_dynamics: Friction | None = None
@@ -221,7 +221,7 @@ def package_info(
         contacts=tuple((frame.name, frame.rows) for frame in chain.contacts),
         loops=tuple((loop.name, loop.rows) for loop in chain.loops),
         payload=_load_maps(model) if payload else (),
-        followers=tuple(_followers(chain)),
+        mimic_joints=tuple(_mimic_sentences(chain)),
         units=units_of(chain.joints[i].type for i in chain.own_joints),
         friction=linear_friction(model) if friction else None,
         in_dynamics=in_dynamics,
@@ -232,7 +232,7 @@ def package_info(
     )
 
 
-def _followers(chain: Mechanism) -> Iterator[str]:
+def _mimic_sentences(chain: Mechanism) -> Iterator[str]:
     for joint, coordinate in zip(chain.joints, chain.coordinates, strict=True):
         if coordinate.leader is not None and chain.joints[coordinate.leader] is not joint:
             names = [chain.joints[leader].name for leader, _ in coordinate.shares]

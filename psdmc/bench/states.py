@@ -20,7 +20,7 @@ COUNT = 65_536
 """States per trial: with a thousand, the branch predictor learns the path of each sincos in glibc."""
 
 Convention = Literal["psdmc", "MuJoCo"]
-"""Of a free root's position, rates and efforts: psdmc's are Pinocchio's."""
+"""Of a floating base's position, rates and efforts: psdmc's are Pinocchio's."""
 
 CACHE_LINE = 64
 """Alignment in bytes of every contestant's arrays, as a careful user's; malloc's own alignment varies."""
@@ -146,16 +146,16 @@ class States:
         """Return q, qd and qdd of all states, converted to MuJoCo's convention for a floating base. The conversion is
         made before the timing starts."""
         states = (self.q, self.qd, self.qdd)
-        converted = to_mujoco(*states) if self.has_free_root else states
+        converted = to_mujoco(*states) if self.has_floating_base else states
         return dict(zip(("q", "qd", "qdd"), converted, strict=True))
 
     def from_mujoco(self, tau: Array) -> Array:
         """Convert (count, nv) torques from MuJoCo's convention to psdmc's."""
-        return force_from_mujoco(self.mujocos["q"], tau) if self.has_free_root else tau
+        return force_from_mujoco(self.mujocos["q"], tau) if self.has_floating_base else tau
 
     @property
-    def has_free_root(self) -> bool:
-        return self.chain.has_free_root
+    def has_floating_base(self) -> bool:
+        return self.chain.has_floating_base
 
     def more(self, function: str) -> int:
         """Return the number of values per state of the function's inputs after the third one; 0 if there are none."""

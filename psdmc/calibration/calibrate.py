@@ -197,7 +197,7 @@ def calibrate_campaign(
     If the result must be physically possible, it is the vector of base parameters that is nearest to the result of the
     four steps. The distance is measured in standard deviations of the fit and the prior.
     """
-    if model.mechanism.has_followers:
+    if model.mechanism.has_mimic_joints:
         raise InputError(
             f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
             "calibrate from logs that do not belong to a campaign",

@@ -162,7 +162,7 @@ def plan_campaign(
     Raises InputError if a joint has no limits, or if no motion is allowed. Motions that need no search are checked
     first.
     """
-    if model.mechanism.has_followers:
+    if model.mechanism.has_mimic_joints:
         raise InputError(
             f"{shown(model.mechanism.name)}: campaigns are for joints that follow no other",
             "derive the model with such joints held: --lock JOINT=0",

@@ -61,7 +61,7 @@ def compare(
     first = model_of(a)
     require_axes(first.mechanism, "comparison")
     require_no_loops(first.mechanism, "comparison")
-    if first.mechanism.has_followers:
+    if first.mechanism.has_mimic_joints:
         raise InputError("psdmc compares models without joints that follow others", "lock those that do")
     second = _like(first, b)
     require_same_robot(first.mechanism, second.mechanism)

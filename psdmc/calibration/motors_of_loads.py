@@ -59,7 +59,7 @@ def motors_with_load(
     Raises InputError if the logs hold no currents, or if a joint has neither constant.
     """
     chain = model.mechanism
-    if chain.has_followers:
+    if chain.has_mimic_joints:
         raise InputError(
             "torque constants are of joints that follow no other", "lock those that do, or log torques"
         )

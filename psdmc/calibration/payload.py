@@ -238,7 +238,7 @@ def identify_payload(
     """
     require_axes(model.mechanism, "payload identification")
     require_no_loops(model.mechanism, "payload identification")
-    if model.mechanism.has_followers:
+    if model.mechanism.has_mimic_joints:
         raise InputError("payload identification is of joints that follow no other", "lock those that do")
     require_cvxpy()
     model.known_theta_b()

@@ -168,7 +168,7 @@ def derive(
         )
     model.save(target)
     sizes = f"l = {model.l}" if model.p is None else f"p = {model.p}, l = {model.l}"
-    own = f" with {model.nv} coordinates" if model.mechanism.has_followers else ""
+    own = f" with {model.nv} coordinates" if model.mechanism.has_mimic_joints else ""
     print(f"{target}: {model.n} joints{own}, {sizes}, largest torque error {model.certificate.max():.1e}")
     for note in model.mechanism.notes:
         print_note(note)

@@ -97,7 +97,7 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
     heads = (
         *("joint", "link"),
         *(() if robot.is_serial else ("hangs on",)),
-        *(("q",) if robot.has_followers else ()),
+        *(("q",) if robot.has_mimic_joints else ()),
         *("type", "position", "speed", "acceleration", "effort", "error"),
     )
     rows = []
@@ -108,7 +108,7 @@ def _joints(robot: Mechanism, errors: Sequence[float | None]) -> Table:
                 joint.name,
                 joint.link_name,
                 *(() if robot.is_serial else (robot.parent_link(i),)),
-                *((followed(robot, i),) if robot.has_followers else ()),
+                *((followed(robot, i),) if robot.has_mimic_joints else ()),
                 joint.type.word,
                 range_text(limits.lower, limits.upper, unit),
                 limit_text(limits.speed, f"{unit}/s"),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from psdmc.derivation.scaled import Long, Scaled, extended, has_small_entries, is_of_many_scales
-from psdmc.dynamics.coordinates import any_follows, first_rates, neutral, normalized
+from psdmc.dynamics.coordinates import first_rates, has_mimic_joints, neutral, normalized
 from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.regressor import echelon_rows, regressor, torque_rows
 from psdmc.reproducible import lengths, times, triangle_solved
@@ -80,7 +80,7 @@ def reduction_for(scaled: Scaled) -> Reduction:
 
     These are the standard parameters that the model's assumptions leave (the columns of `scaled.span`).
     """
-    return _with_mimic_joints(scaled) if any_follows(scaled.frames) else reduction_of(scaled)
+    return _with_mimic_joints(scaled) if has_mimic_joints(scaled.frames) else reduction_of(scaled)
 
 
 def reduction_of(scaled: Scaled) -> Reduction:
@@ -227,7 +227,7 @@ def _with_mimic_joints(scaled: Scaled) -> Reduction:
     each coordinate's rows relative to its own torque. All columns are then eliminated together, the largest first. What
     remains of a column after elimination is rounding, which can hide an effect of 1e-14.
     """
-    free = replace(scaled, frames=tuple(replace(frame, follows=None) for frame in scaled.frames))
+    free = replace(scaled, frames=tuple(replace(frame, mimic=None) for frame in scaled.frames))
     tree = reduction_link_by_link(free)
     if is_plain(scaled):
         own = reduced(_flat(_seen(scaled, tree.pivots)))

@@ -52,11 +52,11 @@ def coupled(
     Sums whose magnitude is at most `zero` are left out. Raises DerivationError if a mimic joint's ratio is no whole number,
     or if a leader's sine and cosine occur with higher powers than two.
     """
-    leaders = [i for i, frame in enumerate(frames) if frame.follows is None]
+    leaders = [i for i, frame in enumerate(frames) if frame.mimic is None]
     number = {i: k for k, i in enumerate(leaders)}
     shares = np.zeros((len(frames), len(leaders)))
     for i, frame in enumerate(frames):
-        own = ((i, 1.0),) if frame.follows is None else frame.follows.shares
+        own = ((i, 1.0),) if frame.mimic is None else frame.mimic.shares
         for leader, ratio in own:
             shares[i, number[leader]] += ratio
     target = Monomials(tuple(monomials.types[i] for i in leaders))
@@ -120,9 +120,9 @@ def _product(a: Sum, b: Sum) -> Sum:
 
 def _of_joint(j: int, digit: int, frames: Sequence[Frame], shares: Array, monomials: Monomials) -> Sum:
     """One function of joint j's position, in the leaders' variables."""
-    follows, own = frames[j].follows, shares[j].tolist()
-    offset = 0.0 if follows is None else float(follows.offset)
-    leaders = (j,) if follows is None else follows.leaders
+    mimic, own = frames[j].mimic, shares[j].tolist()
+    offset = 0.0 if mimic is None else float(mimic.offset)
+    leaders = (j,) if mimic is None else mimic.leaders
     none = (0,) * len(own)
     if any(monomials.types[k].basis is not monomials.types[j].basis for k in leaders):
         raise DerivationError("E and P: an angle follows a sliding joint", UNEXPANDED)

@@ -15,7 +15,7 @@ from psdmc.derivation.certify import judged, measured, snap_effect
 from psdmc.derivation.closed_loops import require_closable, with_passive_joints
 from psdmc.derivation.expand import EXTENDED, FINEST, Precision, can_be_finest, precision_for
 from psdmc.derivation.expand import expand as expanded
-from psdmc.derivation.memory import UNEXPANDED, refuse_long, refuse_uncountable, types_along_ways
+from psdmc.derivation.memory import UNEXPANDED, refuse_long, refuse_uncountable, types_along_paths
 from psdmc.derivation.monomials import merged
 from psdmc.derivation.scaled import Scaled, length_unit, parameter_units, scaled
 from psdmc.dynamics.regressor import EFFECT
@@ -82,10 +82,10 @@ def derive_model(
         return replace(own, mechanism=replace(own.mechanism, gravity=chain.gravity))
     chain = with_passive_joints(chain, require_closable(chain))
     if expand is None:
-        expand = chain.is_serial and not chain.has_followers and all(kind.about_z for kind in chain.types)
+        expand = chain.is_serial and not chain.has_mimic_joints and all(kind.about_z for kind in chain.types)
     if expand:
         _refuse_wide(chain)
-        refuse_long(0, types_along_ways(chain.types, chain.parents), len(chain))
+        refuse_long(0, types_along_paths(chain.types, chain.parents), len(chain))
         refuse_uncountable(chain.types)
     robot = scaled(chain)
     tell("base parameters")

@@ -29,7 +29,7 @@ from psdmc.derivation.memory import (
     largest_monomial_count,
     refuse_beyond,
     refuse_long,
-    types_along_ways,
+    types_along_paths,
     velocity_bytes,
 )
 from psdmc.derivation.monomials import Monomials, Terms, joined, merged, summed, times_matrix
@@ -42,7 +42,7 @@ from psdmc.derivation.scaled import (
     parameter_units,
     torque_units,
 )
-from psdmc.dynamics.coordinates import any_follows
+from psdmc.dynamics.coordinates import has_mimic_joints
 from psdmc.dynamics.frames import BASE, Frame
 from psdmc.dynamics.kinematics import carried_by, path_to
 from psdmc.dynamics.regressor import Placed, carried, twist_in
@@ -94,9 +94,9 @@ def expand(
         scaled = extended(scaled)
     monomials = Monomials(types)
     available = available_memory() if memory is None else memory
-    ways = types_along_ways(types, [frame.parent for frame in scaled.frames])
-    most = sum(map(largest_monomial_count, ways))
-    refuse_beyond(max(map(grid_bytes, ways)), available, most, len(types))
+    paths = types_along_paths(types, [frame.parent for frame in scaled.frames])
+    most = sum(map(largest_monomial_count, paths))
+    refuse_beyond(max(map(grid_bytes, paths)), available, most, len(types))
     progress("mass matrix")
     chosen = scaled.span[:, reduction.pivots]
     of_parameters = mass_matrix_terms(scaled.frames, scaled.link_frames, monomials, precision.zero)
@@ -110,12 +110,12 @@ def expand(
     progress("velocity terms")
     carried = carried_by(scaled.frames)
     count, needed = velocity_bytes(mass, monomials, carried)
-    refuse_long(count, ways, len(types))
+    refuse_long(count, paths, len(types))
     refuse_beyond(needed, available, min(count, most), len(types))
     velocity = velocity_terms(mass, monomials, carried, precision.zero)
     progress("reduction matrices")
     terms = joined([gravity, acceleration_terms(mass, monomials), velocity])
-    if any_follows(scaled.frames):
+    if has_mimic_joints(scaled.frames):
         terms, monomials = coupled(terms, scaled.frames, monomials, precision.zero)
     units = parameter_units(types, scaled.unit)[scaled.leads[reduction.pivots]]
     return Expansion.of(*assembled(terms, monomials, units, scaled.unit, precision.noise))

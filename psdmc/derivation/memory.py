@@ -41,13 +41,15 @@ HEADROOM = 0.75
 """Part of the free memory that an expansion may plan for, as its need is estimated and other processes run."""
 
 
-def types_along_ways(types: Sequence[JointType], parents: Sequence[int]) -> tuple[tuple[JointType, ...], ...]:
+def types_along_paths(
+    types: Sequence[JointType], parents: Sequence[int]
+) -> tuple[tuple[JointType, ...], ...]:
     """Return the joint types on the path from the base to each body that carries no other body. A serial chain has one
     path."""
-    ways: list[tuple[JointType, ...]] = []
+    paths: list[tuple[JointType, ...]] = []
     for joint, parent in zip(types, parents, strict=True):
-        ways.append((*(ways[parent] if parent != BASE else ()), joint))
-    return tuple(way for i, way in enumerate(ways) if i not in parents)
+        paths.append((*(paths[parent] if parent != BASE else ()), joint))
+    return tuple(path for i, path in enumerate(paths) if i not in parents)
 
 
 def refuse_uncountable(types: Sequence[JointType]) -> None:
@@ -119,7 +121,7 @@ def refuse_beyond(needed: int, available: int, monomials: int, n: int) -> None:
     )
 
 
-def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None:
+def refuse_long(terms: int, paths: Sequence[Sequence[JointType]], n: int) -> None:
     """Raise DerivationError if the computation of E and P (exponents and coefficients) would take more than about a
     minute.
 
@@ -127,10 +129,10 @@ def refuse_long(terms: int, ways: Sequence[Sequence[JointType]], n: int) -> None
     for the mass matrix is tested instead.
 
     terms  number of velocity terms, or 0
-    ways   joint types on each path from the base to an end of the robot
+    paths  joint types on each path from the base to an end of the robot
     n      number of joints, for the message
     """
-    grid = max(int(np.prod(quadratic_sizes(way[1:]), dtype=float)) for way in ways)
+    grid = max(int(np.prod(quadratic_sizes(path[1:]), dtype=float)) for path in paths)
     if terms <= LARGEST_EXPANSION and grid <= LARGEST_GRID:
         return
     what = f"{terms:,} velocity terms (limit {LARGEST_EXPANSION:,})"

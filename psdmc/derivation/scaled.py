@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import BASE, Follows, Frame, frames_of
+from psdmc.dynamics.frames import BASE, Frame, Mimic, frames_of
 from psdmc.dynamics.regressor import Placed
 from psdmc.dynamics.scalar import Vector
 from psdmc.reproducible import length, times
@@ -112,13 +112,13 @@ def frames_in_unit(frames: Sequence[Frame], unit: float) -> tuple[Frame, ...]:
     for frame in frames:
         x, y, z = frame.translation
         scaled = replace(frame, translation=(x / unit, y / unit, z / unit))
-        if frame.follows is not None:
-            own, (shares, offset) = frame.joint.length_order, frame.follows
+        if frame.mimic is not None:
+            own, (shares, offset) = frame.joint.length_order, frame.mimic
             shares = tuple(
                 (leader, ratio * unit ** (frames[leader].joint.length_order - own))
                 for leader, ratio in shares
             )
-            scaled = replace(scaled, follows=Follows(shares, offset / unit**own))
+            scaled = replace(scaled, mimic=Mimic(shares, offset / unit**own))
         found.append(scaled)
     return tuple(found)
 

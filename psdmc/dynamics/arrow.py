@@ -289,7 +289,7 @@ def limbs_of(
     for i, frame in enumerate(frames):
         above = BASE if frame.parent == BASE else roots[frame.parent]
         roots.append(i if frame.limbs is not None else above)
-    owners = [root for root, frame in zip(roots, frames, strict=True) if frame.follows is None]
+    owners = [root for root, frame in zip(roots, frames, strict=True) if frame.mimic is None]
     first = first_rates(frames)
     own: dict[int, list[int]] = {}
     for number, root in enumerate(owners):

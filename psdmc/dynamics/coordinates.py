@@ -17,7 +17,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import Follows, Frame
+from psdmc.dynamics.frames import Frame, Mimic
 from psdmc.dynamics.scalar import Scalar
 
 
@@ -53,7 +53,7 @@ def normalized(frames: Sequence[Frame], q: NDArray[Any]) -> NDArray[Any]:
 
 def joints_of_rates(frames: Sequence[Frame]) -> tuple[int, ...]:
     """Return the joint of each rate."""
-    return tuple(i for i, f in enumerate(frames) if f.follows is None for _ in range(f.joint.nv))
+    return tuple(i for i, f in enumerate(frames) if f.mimic is None for _ in range(f.joint.nv))
 
 
 def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
@@ -63,7 +63,7 @@ def flat(values: Iterable[Sequence[Scalar]]) -> list[Scalar]:
 
 def leading(frames: Sequence[Frame]) -> list[Frame]:
     """Return the joints that have their own coordinates, that is, all joints except mimic joints."""
-    return [frame for frame in frames if frame.follows is None]
+    return [frame for frame in frames if frame.mimic is None]
 
 
 def as_tuple(own: Scalar) -> tuple[Scalar, ...]:
@@ -92,9 +92,9 @@ RATES = ("qd", "qdd", "qd_r", "qdd_r", "weights")
 Gather = Callable[[Sequence[Frame], Any], Any]
 
 
-def any_follows(frames: Sequence[Frame]) -> bool:
+def has_mimic_joints(frames: Sequence[Frame]) -> bool:
     """Whether some joint follows another one's coordinate."""
-    return any(frame.follows is not None for frame in frames)
+    return any(frame.mimic is not None for frame in frames)
 
 
 def on_coordinates(gather: Gather | None = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -114,14 +114,14 @@ def on_coordinates(gather: Gather | None = None) -> Callable[[Callable[P, R]], C
         @functools.wraps(algorithm)
         def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
             frames: Any = args[0]
-            if not any_follows(frames):
+            if not has_mimic_joints(frames):
                 return algorithm(*args, **kwargs)
             given = signature.bind(*args, **kwargs)
             values: dict[str, Any] = given.arguments
             for name in (*POSITIONS, *RATES):  # in this order, as it is the order of the generated code
                 if values.get(name) is not None:
                     values[name] = _on_joints(frames, values[name], name in POSITIONS)
-            values["frames"] = tuple(replace(frame, follows=None) for frame in frames)
+            values["frames"] = tuple(replace(frame, mimic=None) for frame in frames)
             found: Any = algorithm(*given.args, **given.kwargs)
             result: R = found if gather is None else gather(frames, found)
             return result
@@ -136,18 +136,18 @@ def _on_joints(frames: Sequence[Frame], values: Sequence[Scalar], are_positions:
     own: dict[int, list[Scalar]] = {}
     rest = list(values)
     for i, frame in enumerate(frames):
-        if frame.follows is None:
+        if frame.mimic is None:
             count = frame.joint.nq if are_positions else frame.joint.nv
             own[i], rest = rest[:count], rest[count:]
     found: list[Scalar] = []
     for i, frame in enumerate(frames):
-        if frame.follows is None:
+        if frame.mimic is None:
             found += own[i]
             continue
         value: Scalar = 0.0
-        for leader, ratio in frame.follows.shares:
+        for leader, ratio in frame.mimic.shares:
             value = _plus(value, _times(ratio, own[leader][0]))
-        offset = frame.follows.offset
+        offset = frame.mimic.offset
         found.append(value + offset if are_positions and offset else value)
     return found
 
@@ -157,15 +157,15 @@ def summed(frames: Sequence[Frame], values: Sequence[Scalar]) -> tuple[Scalar, .
     leader's."""
     found: dict[int, list[Scalar]] = {}
     rest = list(values)
-    followers: list[tuple[Follows, Scalar]] = []
+    mimics: list[tuple[Mimic, Scalar]] = []
     for i, frame in enumerate(frames):
         own, rest = rest[: frame.joint.nv], rest[frame.joint.nv :]
-        if frame.follows is None:
+        if frame.mimic is None:
             found[i] = own
         else:
-            followers.append((frame.follows, own[0]))
-    for follows, value in followers:
-        for leader, ratio in follows.shares:
+            mimics.append((frame.mimic, own[0]))
+    for mimic, value in mimics:
+        for leader, ratio in mimic.shares:
             found[leader] = [_plus(found[leader][0], _times(ratio, value))]
     return tuple(x for own in found.values() for x in own)
 
@@ -200,7 +200,7 @@ def sparse_rows_summed(
     """Sum the rows of mimic joints onto those of their leaders, in a sparse matrix such as the regressor."""
     wanted = sorted({column for row in rows for column in row})
     found: tuple[dict[int, Scalar], ...] = tuple(
-        {} for frame in frames if frame.follows is None for _ in range(frame.joint.nv)
+        {} for frame in frames if frame.mimic is None for _ in range(frame.joint.nv)
     )
     for column in wanted:
         for row, value in zip(found, summed(frames, [row.get(column, 0.0) for row in rows]), strict=True):

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.coordinates import any_follows, as_tuple, first_rates, flat, positions, rates
+from psdmc.dynamics.coordinates import as_tuple, first_rates, flat, has_mimic_joints, positions, rates
 from psdmc.dynamics.frames import (
     BASE,
     Frame,
@@ -70,7 +70,7 @@ def forward_dynamics(
     other arguments are those of `inverse_dynamics`. There may be no mimic joints. Raises SingularMatrix if a pivot is a
     constant that is not positive.
     """
-    if any_follows(frames):
+    if has_mimic_joints(frames):
         raise ValueError("a joint that follows another: its acceleration is not its own")
     still = [0.0] * first_rates(frames)[-1]
     forward = sweep_outward(frames, q, qd, None, still, base, choices)

@@ -2,9 +2,9 @@
 
 The placement of frame i in its parent's frame has the rotation and translation rotation @ Rz(turn + offset),
 translation + rotation @ z slide. The angle `turn` and the displacement `slide` follow from q by the type of the joint.
-For a joint of several coordinates, the placement is rotation @ rotation(q), translation + rotation @ way(q), with the
-functions of the joint type. Each frame has one rigid body, whose parameters are relative to the frame. Parents come
-before their children. Multiples of 90 degrees in the offset are stored separately, because they exchange sine and
+For a joint of several coordinates, the placement is rotation @ rotation(q), translation + rotation @ displacement(q),
+with the functions of the joint type. Each frame has one rigid body, whose parameters are relative to the frame. Parents
+come before their children. Multiples of 90 degrees in the offset are stored separately, because they exchange sine and
 cosine exactly and need no operations.
 """
 
@@ -34,7 +34,7 @@ from psdmc.robot.mechanism import Mechanism, Placement
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class Follows(NamedTuple):
+class Mimic(NamedTuple):
     """Position of a joint without its own coordinate: the sum of ratio * q_leader over `shares`, plus the offset.
 
     shares  leaders, each with its ratio; a mimic joint has one
@@ -72,7 +72,7 @@ class Frame:
     translation: Vector
     offset: Scalar = 0.0
     quarters: int = 0
-    follows: Follows | None = None
+    mimic: Mimic | None = None
     limbs: Callable[[Scalar], Scalar] | None = None
     is_parallel: bool = field(init=False, compare=False)
     inward_rows: Fixed = field(init=False, compare=False)
@@ -159,7 +159,7 @@ def as_vector(values: Sequence[Scalar]) -> Vector:
 def frames_of(chain: Mechanism) -> tuple[Frame, ...]:
     """The robot's own joint frames, none moved."""
     return tuple(
-        replace(frame_at(joint.type, parent, joint.placement), follows=what_follows(chain, i))
+        replace(frame_at(joint.type, parent, joint.placement), mimic=mimic_of(chain, i))
         for i, (joint, parent) in enumerate(zip(chain.joints, chain.parents, strict=True))
     )
 
@@ -172,8 +172,8 @@ def with_carriers(frames: Sequence[Frame], joints: Iterable[int]) -> tuple[int, 
         joint = left.pop()
         if joint != BASE and joint not in kept:
             kept.add(joint)
-            follows = frames[joint].follows
-            left += [frames[joint].parent, *(() if follows is None else follows.leaders)]
+            mimic = frames[joint].mimic
+            left += [frames[joint].parent, *(() if mimic is None else mimic.leaders)]
     return tuple(sorted(kept))
 
 
@@ -184,22 +184,20 @@ def part_of(frames: Sequence[Frame], kept: Sequence[int]) -> tuple[Frame, ...]:
     """
     number = {joint: i for i, joint in enumerate(kept)} | {BASE: BASE}
 
-    def renumbered(follows: Follows) -> Follows:
-        return follows._replace(shares=tuple((number[leader], ratio) for leader, ratio in follows.shares))
+    def renumbered(mimic: Mimic) -> Mimic:
+        return mimic._replace(shares=tuple((number[leader], ratio) for leader, ratio in mimic.shares))
 
     own = (frames[joint] for joint in kept)
-    return tuple(
-        replace(f, parent=number[f.parent], follows=f.follows and renumbered(f.follows)) for f in own
-    )
+    return tuple(replace(f, parent=number[f.parent], mimic=f.mimic and renumbered(f.mimic)) for f in own)
 
 
-def what_follows(chain: Mechanism, i: int) -> Follows | None:
+def mimic_of(chain: Mechanism, i: int) -> Mimic | None:
     """Return the leaders of joint i if it follows other joints, as a mimic joint does. The result is None if the joint
     has its own coordinate."""
     coordinate = chain.coordinates[i]
     if coordinate.leader is None or coordinate.leader == i:
         return None
-    return Follows(coordinate.shares, coordinate.offset)
+    return Mimic(coordinate.shares, coordinate.offset)
 
 
 def frame_at(joint: JointType, parent: int, placement: Placement) -> Frame:
@@ -269,13 +267,13 @@ def joint_angle(frame: Frame, q: Scalar) -> Angle:
 def joint_offset(frame: Frame, q: Scalar) -> Vector:
     """Return the origin (m) of the frame in its parent's frame, at joint position q."""
     if not frame.joint.about_z:
-        moved = frame.joint.way(q)
+        moved = frame.joint.displacement(q)
         return frame.translation if moved is None else add(frame.translation, to_previous(frame, moved))
-    way = frame.joint.slide(q)
-    if way is None:
+    height = frame.joint.slide(q)
+    if height is None:
         return frame.translation
     x, y, z = frame.translation
-    slide = (frame.rotation[0][2] * way, frame.rotation[1][2] * way, frame.rotation[2][2] * way)
+    slide = (frame.rotation[0][2] * height, frame.rotation[1][2] * height, frame.rotation[2][2] * height)
     return (x + slide[0], y + slide[1], z + slide[2])
 
 

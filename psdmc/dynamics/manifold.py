@@ -33,7 +33,7 @@ from psdmc.robot.joints import JointType
 
 def integrated(frames: Sequence[Frame], q: Sequence[Scalar], step: Sequence[Scalar]) -> list[Scalar]:
     """Return the nq coordinates after one second of motion from q at constant rates `step`, nv of them."""
-    return [x for joint, here, way in _joints(frames, q, step) for x in joint.integrated(here, way)]
+    return [x for joint, here, own in _joints(frames, q, step) for x in joint.integrated(here, own)]
 
 
 def difference(frames: Sequence[Frame], q: Sequence[Scalar], other: Sequence[Scalar]) -> list[Scalar]:
@@ -47,14 +47,14 @@ def coordinate_rates(frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequen
 
 
 def rates_bent(
-    frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+    frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar], motion: Sequence[Scalar]
 ) -> list[Scalar]:
     """Return the changes per second (nq) of the result of `coordinate_rates` at constant joint rates, while q moves.
 
     rates  (nv) the constant joint rates
-    way    (nv) joint rates at which q moves
+    motion (nv) joint rates at which q moves
     """
-    both = zip(_joints(frames, q, rates), _joints(frames, q, way), strict=True)
+    both = zip(_joints(frames, q, rates), _joints(frames, q, motion), strict=True)
     return [x for (joint, here, own), (_, _, moved) in both for x in joint.rates_bent(here, own, moved)]
 
 
@@ -99,11 +99,11 @@ def _joints(
     frames: Sequence[Frame], q: Sequence[Scalar], rates: Sequence[Scalar]
 ) -> Iterator[tuple[JointType, Sequence[Scalar], Sequence[Scalar]]]:
     """Each joint that has coordinates of its own, with these and its rates."""
-    at, way = 0, 0
+    at, rate = 0, 0
     for frame in leading(frames):
         joint = frame.joint
-        yield joint, q[at : at + joint.nq], rates[way : way + joint.nv]
-        at, way = at + joint.nq, way + joint.nv
+        yield joint, q[at : at + joint.nq], rates[rate : rate + joint.nv]
+        at, rate = at + joint.nq, rate + joint.nv
 
 
 Rows = Sequence[Sequence[Scalar]]
@@ -119,11 +119,11 @@ class StepSlopes(NamedTuple):
     displacements along the joint's nv rates.
 
     by_start  by the position at the start of the step
-    by_way    by the joint's rates times the duration of the step
+    by_step   by the joint's rates times the duration of the step
     """
 
     by_start: Rows
-    by_way: Rows
+    by_step: Rows
 
 
 def step_slopes(
@@ -144,8 +144,8 @@ def step_slopes(
     return found
 
 
-def _slopes(joint: JointType, way: Sequence[Scalar]) -> StepSlopes:
-    v, w = combined(joint, way)
+def _slopes(joint: JointType, step: Sequence[Scalar]) -> StepSlopes:
+    v, w = combined(joint, step)
     turns, across, squared, product = _cross_matrix(w), _cross_matrix(v), dot(w, w), dot(v, w)
     b, c, d, e = _coefficients(squared)
     twice = _plus(_outer(w, w), _diagonal(-squared))

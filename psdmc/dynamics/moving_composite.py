@@ -152,9 +152,9 @@ def _rotated(composite: Composite, turn: Rotation) -> Composite:
 def driven(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:
     """Add a joint's motion to a composite. The given composite moves relative to the link after the joint, the returned
     one relative to the link before the joint."""
-    rate, way = joint.turn(qd), joint.slide(qd)
+    rate, slide = joint.turn(qd), joint.slide(qd)
     found = composite if rate is None else _spinning(composite, rate, joint.turn(qdd))
-    return found if way is None else _sliding(found, way, joint.slide(qdd))
+    return found if slide is None else _sliding(found, slide, joint.slide(qdd))
 
 
 def driven_freely(joint: JointType, composite: Composite, qd: Scalar, qdd: Scalar) -> Composite:

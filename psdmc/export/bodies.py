@@ -68,7 +68,7 @@ class Body:
     inertial: tuple[float, Array, Array] | None
     drive: float
     friction: JointFriction | None
-    follows: Coordinate | None
+    mimic: Coordinate | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +170,7 @@ def _body(
         inertial=about_com(own) if own[0] > 0.0 else None,
         drive=float(x[DRIVE]),
         friction=friction,
-        follows=coordinate if coordinate.leader != k else None,
+        mimic=coordinate if coordinate.leader != k else None,
     )
 
 

@@ -155,13 +155,13 @@ def joint_element(body: Body, what: Written) -> Element:
     SubElement(joint, "child", link=body.name)
     SubElement(joint, "axis", xyz=exact(body.axis))
     joint.append(limit_element(body.joint.limits))
-    if body.follows is not None and body.follows.leader is not None:
+    if body.mimic is not None and body.mimic.leader is not None:
         SubElement(
             joint,
             "mimic",
-            joint=what.bodies[body.follows.leader].joint.name,
-            multiplier=exact([body.follows.ratio]),
-            offset=exact([body.follows.offset]),
+            joint=what.bodies[body.mimic.leader].joint.name,
+            multiplier=exact([body.mimic.ratio]),
+            offset=exact([body.mimic.offset]),
         )
     if body.friction is not None:
         joint.append(dynamics_element(body.friction))

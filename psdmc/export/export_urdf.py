@@ -98,15 +98,15 @@ def export_urdf(
 
 
 def _require_exportable(model: DynamicsModel) -> None:
-    """InputError where a joint is of a kind that is not written: all but one of one coordinate, and a free root."""
+    """InputError where a joint is of a kind that is not written: all but one of one coordinate, and a floating base."""
     chain = model.mechanism
     if not all(kind.about_z for kind in chain.types[1:]) or not (
-        chain.has_free_root or chain.types[0].about_z
+        chain.has_floating_base or chain.types[0].about_z
     ):
         require_axes(chain, "a written URDF")
     own = zip(chain.joint_names, chain.coordinates, strict=True)
     sums = [name for name, coordinate in own if coordinate.others]
-    linked = [name for name in _followers(model) if name not in sums]
+    linked = [name for name in _linked_by_loops(model) if name not in sums]
     if sums or linked:
         what = (
             "several joints, which a URDF cannot contain"
@@ -120,7 +120,7 @@ def _require_exportable(model: DynamicsModel) -> None:
     model.known_theta_b()
 
 
-def _followers(model: DynamicsModel) -> list[str]:
+def _linked_by_loops(model: DynamicsModel) -> list[str]:
     """Joints of a URDF that follow others without <mimic>: those of parallelograms."""
     kept, chain = model.provenance, model.mechanism
     if kept.get("source_format") != "urdf" or not kept.get("options", {}).get("loops"):

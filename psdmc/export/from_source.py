@@ -79,7 +79,7 @@ def urdf_with(what: Written, provenance: Mapping[str, Any]) -> tuple[Element, tu
 
 
 def _below(robot: UrdfRobot, base: str) -> dict[str, None]:
-    """Links from the base outward. A free root's world is no link of the file: its one joint has the base below."""
+    """Links from the base outward. A floating base's world is no link of the file: its one joint has the base below."""
     start = base if base in robot.inertials else robot.root
     kept, queue = {start: None}, [start]
     while queue:

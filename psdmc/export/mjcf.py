@@ -38,12 +38,12 @@ def mjcf_of(what: Written) -> Element:
         elements.append(_body(outer, body))
     for frame in what.frames:
         _place(SubElement(elements[frame.joint], "site", name=frame.name), frame.placement)
-    followers = [(body, body.follows) for body in what.bodies if body.follows is not None]
-    equality = SubElement(root, "equality") if followers else None
-    for body, follows in followers:
-        if equality is not None and follows.leader is not None:
-            leader = what.bodies[follows.leader].joint.name
-            bent = exact([follows.offset, follows.ratio, 0.0, 0.0, 0.0])
+    mimics = [(body, body.mimic) for body in what.bodies if body.mimic is not None]
+    equality = SubElement(root, "equality") if mimics else None
+    for body, mimic in mimics:
+        if equality is not None and mimic.leader is not None:
+            leader = what.bodies[mimic.leader].joint.name
+            bent = exact([mimic.offset, mimic.ratio, 0.0, 0.0, 0.0])
             SubElement(equality, "joint", joint1=body.joint.name, joint2=leader, polycoef=bent)
     return root
 

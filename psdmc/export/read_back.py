@@ -10,7 +10,7 @@ import numpy as np
 
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import states_of
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import DRIVE, PARAMETERS_PER_LINK, Array
 from psdmc.robot.mjcf.mujoco_model import kept_warnings
@@ -67,9 +67,9 @@ def read_urdf_back(model: DynamicsModel, text: str, drives: Array, gravity: Arra
 
 
 def _mujoco(loaded: LoadedRobot, states: tuple[Array, Array, Array]) -> Array:
-    following = Following.of(loaded.mechanism.coordinates, loaded.mechanism.types)
-    free = (following.positions(states[0]), *map(following.rates, states[1:]))
-    return following.summed(mujoco_torques(loaded, *free))
+    mimic_map = MimicMap.of(loaded.mechanism.coordinates, loaded.mechanism.types)
+    free = (mimic_map.positions(states[0]), *map(mimic_map.rates, states[1:]))
+    return mimic_map.summed(mujoco_torques(loaded, *free))
 
 
 def read_mjcf_back(model: DynamicsModel, text: str) -> Reading:
@@ -86,15 +86,15 @@ def read_mjcf_back(model: DynamicsModel, text: str) -> Reading:
     found.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     found.dof_damping[:] = 0.0
     (q, qd, qdd), expected = _expected(model, np.zeros(model.n))
-    following = Following.of(model.mechanism.coordinates, model.mechanism.types)
-    q, qd, qdd = following.positions(q), following.rates(qd), following.rates(qdd)
+    mimic_map = MimicMap.of(model.mechanism.coordinates, model.mechanism.types)
+    q, qd, qdd = mimic_map.positions(q), mimic_map.rates(qd), mimic_map.rates(qdd)
     floating = not model.mechanism.types[0].about_z
     if floating:
         q, qd, qdd = to_mujoco(q, qd, qdd)
     torques = _inverse(mujoco, found, model, q, qd, qdd)
     if floating:
         torques = force_from_mujoco(q, torques)
-    return Reading("MuJoCo", _error(following.summed(torques), expected))
+    return Reading("MuJoCo", _error(mimic_map.summed(torques), expected))
 
 
 REASON = 160

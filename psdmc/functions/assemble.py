@@ -52,7 +52,7 @@ def trace(g: Ingredients) -> Outputs:
 def regions(frames: Sequence[Frame], named: Sequence[NamedFrame], loops: Sequence[Loop] = ()) -> Regions:
     """Return the function's body: a loop over the Newton steps. The signs of the last one stay."""
     nq, rows = (
-        sum(frame.joint.nq for frame in frames if frame.follows is None),
+        sum(frame.joint.nq for frame in frames if frame.mimic is None),
         sum(len(loop.rows) for loop in loops),
     )
 

@@ -76,8 +76,8 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
     """
     nv = _rates(frames)
     width, size = 3 * nv, nv * nv
-    is_followed = any(frame.follows and 0 in frame.follows.leaders for frame in frames)
-    still = 0 if is_followed else frames[0].joint.nv
+    is_mimicked = any(frame.mimic and 0 in frame.mimic.leaders for frame in frames)
+    still = 0 if is_mimicked else frames[0].joint.nv
 
     def weighted_row(read: Reader) -> dict[str, Column]:
         return {"weight": Column([_product(read("row", nv), read("cotangent", nv))])}
@@ -188,7 +188,7 @@ def _bent_rows(frames: Sequence[Frame], still: int, nv: int) -> Iterator[For]:
 def _coupled(frames: Sequence[Frame]) -> list[tuple[int, ...]]:
     """For each rate those that move a joint of it, carry one or are carried by one."""
     moved = [
-        {i for i, frame in enumerate(frames) if owner in (i, frame.follows and frame.follows[0])}
+        {i for i, frame in enumerate(frames) if owner in (i, frame.mimic and frame.mimic[0])}
         for owner in joints_of_rates(frames)
     ]
     carriers = [set(with_carriers(frames, own)) for own in moved]

@@ -83,7 +83,7 @@ def state_and_jacobians(
         for i, own in enumerate(step_slopes(frames, rates, dt)):
             if own is not None:
                 found[f"start_{i}"] = [x for row in own.by_start for x in row]
-                found[f"way_{i}"] = [dt * x for row in own.by_way for x in row]
+                found[f"way_{i}"] = [dt * x for row in own.by_step for x in row]
         return {name: Column(values) for name, values in found.items()}
 
     places = [

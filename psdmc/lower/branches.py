@@ -68,7 +68,7 @@ class Branches:
         rows = [row for row, (joint, _) in enumerate(links) if joint in number]
         carriers = tuple(PARAMETERS_PER_LINK * number[links[row][0]] + links[row][1] for row in rows)
         reframed = _part_of(whole.reframed, kept)
-        joints = [frame.joint for frame in reframed.frames if frame.follows is None]
+        joints = [frame.joint for frame in reframed.frames if frame.mimic is None]
         old = self.robot.sizes
         sizes = replace(old, n=len(kept), nq=sum(j.nq for j in joints), nv=sum(j.nv for j in joints))
         arrangement = replace(whole, reframed=reframed, carriers=carriers, transfer=whole.transfer[rows])

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from psdmc.dynamics.choices import PLAIN, Choices
-from psdmc.dynamics.frames import Follows, Frame
+from psdmc.dynamics.frames import Frame, Mimic
 from psdmc.dynamics.scalar import Scalar, Vector
 from psdmc.dynamics.spatial import Body
 from psdmc.errors import InputError
@@ -111,14 +111,14 @@ class _Measured:
         return _Placed(place.rotation, self.vector(place.translation.tolist(), LENGTH))  # type: ignore[arg-type]
 
     def frame(self, frame: Frame) -> Frame:
-        follows = frame.follows
-        if follows is not None:
+        mimic = frame.mimic
+        if mimic is not None:
             own, shares = Dimension(0, frame.joint.length_order), []
-            for leader, ratio in follows.shares:
+            for leader, ratio in mimic.shares:
                 other = Dimension(0, self.reframed.frames[leader].joint.length_order)
                 shares.append((leader, ratio if own == other else self.value(times(own, other, -1))))
-            follows = Follows(tuple(shares), follows.offset and self.value(own))
-        return replace(frame, translation=self.vector(frame.translation, LENGTH), follows=follows)
+            mimic = Mimic(tuple(shares), mimic.offset and self.value(own))
+        return replace(frame, translation=self.vector(frame.translation, LENGTH), mimic=mimic)
 
     def bodies(self, of: Callable[[Dimension], Scalar]) -> tuple[tuple[Body, ...], tuple[Scalar, ...]]:
         """Return all bodies and drive inertias as symbols: `of` makes the symbol for each entry, from the entry's

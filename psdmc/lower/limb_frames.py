@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psdmc.dynamics.frames import BASE, Follows, Frame
+from psdmc.dynamics.frames import BASE, Frame, Mimic
 from psdmc.dynamics.scalar import Matrix, Scalar, Vector
 from psdmc.dynamics.spatial import Body
 from psdmc.program.lanes import lanes
@@ -25,29 +25,29 @@ LARGEST = 8
 
 
 def possible_groups(frames: Sequence[Frame]) -> tuple[tuple[Limbs, ...], ...]:
-    """Return the possible ways to divide a robot into groups of equal limbs.
+    """Return the possible divisions of a robot into groups of equal limbs.
 
-    In one way, a group consists of all branches with joints of equal types. In another way, also the joint frames must
+    In one division, a group consists of all branches with joints of equal types. In another, also the joint frames must
     have equal zeros. A mimic joint must follow a joint of its own limb, at the same place in all limbs of the group.
     """
     parents = [frame.parent for frame in frames]
-    ways: list[tuple[Limbs, ...]] = []
+    divisions: list[tuple[Limbs, ...]] = []
     for label in (_type_of, _pattern_of):
         found = limb_groups(parents, [label(frame) for frame in frames])
-        usable = tuple(limbs for limbs in found if len(limbs) <= LARGEST and _follow_alike(frames, limbs))
-        if usable and usable not in ways:
-            ways.append(usable)
-    return tuple(ways)
+        usable = tuple(limbs for limbs in found if len(limbs) <= LARGEST and _mimic_alike(frames, limbs))
+        if usable and usable not in divisions:
+            divisions.append(usable)
+    return tuple(divisions)
 
 
-def _follow_alike(frames: Sequence[Frame], limbs: Limbs) -> bool:
+def _mimic_alike(frames: Sequence[Frame], limbs: Limbs) -> bool:
     """Whether joints of these limbs are followed from within their limb alone, and follow there what is at one place."""
     place = {joint: (number, k) for number, limb in enumerate(limbs) for k, joint in enumerate(limb)}
     alike: dict[int, set[tuple[int, ...]]] = {}
     for joint, frame in enumerate(frames):
-        if frame.follows is None:
+        if frame.mimic is None:
             continue
-        own, led_by = place.get(joint), [place.get(leader) for leader in frame.follows.leaders]
+        own, led_by = place.get(joint), [place.get(leader) for leader in frame.mimic.leaders]
         if own is None and not any(led_by):
             continue
         if own is None or any(leader is None or leader[0] != own[0] for leader in led_by):
@@ -57,15 +57,15 @@ def _follow_alike(frames: Sequence[Frame], limbs: Limbs) -> bool:
 
 
 def _type_of(frame: Frame) -> Hashable:
-    return frame.joint.word, frame.follows is None
+    return frame.joint.word, frame.mimic is None
 
 
 def _pattern_of(frame: Frame) -> Hashable:
     """Return the pattern that decides which operations a frame costs. Those on the base turn constants alone."""
     if frame.parent == BASE:
-        return frame.joint.word, frame.follows is None, frame.quarters
+        return frame.joint.word, frame.mimic is None, frame.quarters
     zeros = tuple(x == 0.0 for row in (*frame.rotation, frame.translation) for x in row)
-    is_own = frame.follows is None
+    is_own = frame.mimic is None
     return frame.joint.word, is_own, frame.is_parallel, zeros, frame.offset == 0.0, frame.quarters
 
 
@@ -166,22 +166,22 @@ def one_limb(frames: Sequence[Frame], among: Sequence[Place]) -> tuple[Frame, ..
         replace(
             _merged([frames[joint] for joint in place.joints], place.group),
             parent=new[frames[place.joints[0]].parent],
-            follows=_followed([frames[joint] for joint in place.joints], place, new),
+            mimic=_mimic_of_place([frames[joint] for joint in place.joints], place, new),
         )
         for place in among
     )
 
 
-def _followed(frames: Sequence[Frame], place: Place, new: Mapping[int, int]) -> Follows | None:
+def _mimic_of_place(frames: Sequence[Frame], place: Place, new: Mapping[int, int]) -> Mimic | None:
     """Return the places that the joint of a place follows, with a constant per limb if ratios or offsets differ."""
-    follows = [frame.follows for frame in frames if frame.follows is not None]
-    if not follows:
+    mimics = [frame.mimic for frame in frames if frame.mimic is not None]
+    if not mimics:
         return None
     shares = tuple(
         (new[own[0][0]], place.constant([ratio for _, ratio in own]))
-        for own in zip(*(each.shares for each in follows), strict=True)
+        for own in zip(*(each.shares for each in mimics), strict=True)
     )
-    return Follows(shares, place.constant([each.offset for each in follows]))
+    return Mimic(shares, place.constant([each.offset for each in mimics]))
 
 
 def _merged(frames: Sequence[Frame], group: int | None) -> Frame:

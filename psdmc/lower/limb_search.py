@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psdmc.dynamics.choices import ByChoices, Choices
-from psdmc.dynamics.coordinates import any_follows
+from psdmc.dynamics.coordinates import has_mimic_joints
 from psdmc.dynamics.frames import BASE
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.lower.accuracy import LIMIT
@@ -139,7 +139,7 @@ class LimbSearch:
         search for link frames and nonzero link parameters begins at `start`. Return None if the function or the target
         processor does not allow any."""
         # Accelerations cannot go by articulated bodies where joints follow others.
-        is_eliminated = self.recipe.accelerates and any_follows(start.reframed.frames)
+        is_eliminated = self.recipe.accelerates and has_mimic_joints(start.reframed.frames)
         if not self.costs.has_vectors or is_eliminated:
             return None
         ways = [self._arranged(start, groups) for groups in possible_groups(start.reframed.frames)]

@@ -182,7 +182,7 @@ class _Trace:
         self.first = {
             axis: [
                 0,
-                *accumulate(0 if frame.follows else getattr(frame.joint, axis) for frame in whole.frames),
+                *accumulate(0 if frame.mimic else getattr(frame.joint, axis) for frame in whole.frames),
             ]
             for axis in ("nq", "nv")
         }

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psdmc.dynamics.coordinates import any_follows, first_rates, neutral, normalized
+from psdmc.dynamics.coordinates import first_rates, has_mimic_joints, neutral, normalized
 from psdmc.dynamics.parameters import joint_frame_map
 from psdmc.dynamics.regressor import regressor, torque_rows
 from psdmc.dynamics.scalar import Scalar
@@ -120,7 +120,7 @@ def carrier_space(reframed: Reframed, representative: Array) -> CarrierSpace:
     representative  matrix from theta_b to standard parameters about the link frames
     """
     n = len(reframed.frames)
-    is_sampled = n <= SAMPLED_JOINTS or any_follows(reframed.frames)
+    is_sampled = n <= SAMPLED_JOINTS or has_mimic_joints(reframed.frames)
     samples = _sampled_columns(reframed) if is_sampled else _torque_rows(reframed)
     lift = _lifted(reframed, representative)
     unused_drives = [

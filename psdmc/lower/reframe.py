@@ -26,7 +26,7 @@ from psdmc.dynamics.frames import (
     as_vector,
     base_acceleration,
     frames_of,
-    what_follows,
+    mimic_of,
 )
 from psdmc.dynamics.scalar import ZERO, Matrix, Vector
 from psdmc.reproducible import angle_of, cross, length, times
@@ -103,7 +103,7 @@ def reframe(chain: Mechanism, feet: Sequence[Foot], turns_base: bool = True) -> 
                 as_vector(clean_lengths(offset, reach).tolist()),
                 0.0 if abs(rest) < EXACT else float(rest),
                 quarters % 4,
-                what_follows(chain, i),
+                mimic_of(chain, i),
             )
         )
         mine = Placement(after[i], origins[i])

@@ -19,7 +19,7 @@ from operator import ne
 import numpy as np
 
 from psdmc.dynamics.choices import ByChoices, Choices
-from psdmc.dynamics.coordinates import any_follows
+from psdmc.dynamics.coordinates import has_mimic_joints
 from psdmc.dynamics.solve import SingularMatrix
 from psdmc.errors import InternalError
 from psdmc.lower.accuracy import LIMIT, WRONG, Accuracy
@@ -315,7 +315,7 @@ class Search:
     def _by_the_cheaper_way(self, recipe: Recipe, start: Arrangement, scoring: Scoring) -> Arrangement:
         """Choose articulated bodies if they cost less from the start. Serial arms keep the factorized mass matrix: what
         the two differ by there is less than what the search goes on to find."""
-        if not recipe.accelerates or self._is_arm or any_follows(start.reframed.frames):
+        if not recipe.accelerates or self._is_arm or has_mimic_joints(start.reframed.frames):
             return start
         other = replace(start, choices=replace(start.choices, articulated=True))
         costs = [scoring.weight(self.cost(recipe, each)) for each in (start, other)]

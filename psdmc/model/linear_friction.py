@@ -37,7 +37,7 @@ def linear_friction(model: DynamicsModel) -> Friction:
     """Return the friction that the model's calibration found, as a sum of terms. Raises InputError if the model was not
     calibrated, or if its friction has an internal state. Raises InputError also for coupled motors, for mimic joints,
     and for damaged friction data in the file."""
-    if model.calibrated is not None and model.mechanism.has_followers:
+    if model.calibrated is not None and model.mechanism.has_mimic_joints:
         name = shown(model.mechanism.name)
         raise InputError(f"{name}: friction is of joints that follow no other", "lock those that do")
     return _friction_of(model, model.joint_names)

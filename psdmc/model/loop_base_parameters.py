@@ -292,9 +292,9 @@ def _closed_positions(
     with np.errstate(all="ignore"):
         for _ in range(WALK):
             wanted = goal + 0.5 * rng.uniform(-1.0, 1.0, goal.shape)
-            way = _allowed(robot.loops, _jacobian(robot, frames, q), none, wanted).motion
-            way *= stride / np.maximum(np.abs(way).max(axis=0, initial=0.0), 1e-300)
-            there, size, shares = _newton(robot, frames, _moved(frames, q, way))
+            motion = _allowed(robot.loops, _jacobian(robot, frames, q), none, wanted).motion
+            motion *= stride / np.maximum(np.abs(motion).max(axis=0, initial=0.0), 1e-300)
+            there, size, shares = _newton(robot, frames, _moved(frames, q, motion))
             fits = (size < 0.25 * stride) & (shares > least)
             for _ in range(CORRECTIONS):
                 there, size, _ = _newton(robot, frames, there)

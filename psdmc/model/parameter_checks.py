@@ -164,7 +164,7 @@ def _magnitudes(model: DynamicsModel, travel: Array) -> Array:
     slides = [[not any(angular) for _, angular in joint.type.twists] for joint in mechanism.joints]
     result = [[drive] * len(rates) for drive, rates in zip(x[:, 10].tolist(), slides, strict=True)]
     steps = [
-        math.hypot(*joint.placement.translation) + _way(joint, own)
+        math.hypot(*joint.placement.translation) + _distance(joint, own)
         for joint, own in zip(mechanism.joints, _travels(mechanism, travel), strict=True)
     ]
     for body, joint in enumerate(mechanism.joints):
@@ -191,11 +191,11 @@ def _travels(mechanism: Mechanism, travel: Array) -> list[Any]:
     ]
 
 
-def _way(joint: Joint, travel: Any) -> float:
+def _distance(joint: Joint, travel: Any) -> float:
     """How far a joint goes."""
     if joint.type.about_z:
         return abs(float(joint.type.slide(travel) or 0.0))
-    return math.hypot(*(joint.type.way(travel) or (0.0,)))
+    return math.hypot(*(joint.type.displacement(travel) or (0.0,)))
 
 
 def _range(joint: Joint) -> tuple[float, float]:

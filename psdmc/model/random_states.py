@@ -119,7 +119,7 @@ def _stepped(
     factors = factorize(wide)
     shares = solve(factors, errors)
     rest = [pivot / wide[k][k] for k, pivot in enumerate(factors.pivots)]
-    step = np.zeros((len(q), sum(frame.joint.nv for frame in frames if frame.follows is None)))
+    step = np.zeros((len(q), sum(frame.joint.nv for frame in frames if frame.mimic is None)))
     step[:, list(moving)] = -columns(
         [inner_product(column, shares) for column in zip(*rows, strict=True)], len(q)
     )

@@ -170,7 +170,7 @@ def closer(
     moved = integrated(frames, q, [share * x for x in step])
     passive = {joint for loop in loops for joint in loop.passive}
     moves = [
-        j in passive for j, frame in enumerate(frames) if frame.follows is None for _ in range(frame.joint.nq)
+        j in passive for j, frame in enumerate(frames) if frame.mimic is None for _ in range(frame.joint.nq)
     ]
     there = [new if moving else old for new, old, moving in zip(moved, q, moves, strict=True)]
     return there, [
@@ -193,10 +193,7 @@ def passive_rates(frames: Sequence[Frame], loops: Sequence[Loop]) -> tuple[list[
     """Return the numbers of the passive rates, and for each rate whether it is linear (m/s), not angular (rad/s)."""
     passive = {joint for loop in loops for joint in loop.passive}
     own = [
-        (j, order)
-        for j, frame in enumerate(frames)
-        if frame.follows is None
-        for order in frame.joint.v_orders
+        (j, order) for j, frame in enumerate(frames) if frame.mimic is None for order in frame.joint.v_orders
     ]
     numbers = [k for k, (joint, _) in enumerate(own) if joint in passive]
     return numbers, [order != 0 for _, order in own]

@@ -133,9 +133,12 @@ class ContactFunction:
         found, signs, factors, _ = self.solved(g)
         inputs = [x for each in self.by for x in g.inputs[each.name]]
         first, *others = (g.inputs[each.name] for each in self.directions)
-        way = [*coordinate_rates(g.frames, g.inputs["q"], first), *(x for other in others for x in other)]
+        direction = [
+            *coordinate_rates(g.frames, g.inputs["q"], first),
+            *(x for other in others for x in other),
+        ]
         free, values = self._free(g, found)
-        changes = substituted(slopes(values, inputs, way), free, [*found.motion, *found.forces])
+        changes = substituted(slopes(values, inputs, direction), free, [*found.motion, *found.forces])
         nv = len(found.motion)
         load, wanted = [-x for x in changes[:nv]], [-x for x in changes[nv:]]
         blocks = solved_again(factors, found, load, wanted, Held.of(g).rows[0])

@@ -123,8 +123,8 @@ def torque_slopes(
     count as constants."""
     q, qd, free = g.inputs["q"], g.inputs["qd"], _free(g, qdd)
     tau = torques(g, qd, free, g.base_acceleration, external=external)
-    way = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name], *along]
-    return substituted(slopes(tau, [*q, *qd, *others], way), free, qdd)
+    direction = [*coordinate_rates(g.frames, q, g.inputs[DQ.name]), *g.inputs[DQD.name], *along]
+    return substituted(slopes(tau, [*q, *qd, *others], direction), free, qdd)
 
 
 def _free(g: Ingredients, qdd: Sequence[Scalar]) -> list[Scalar]:

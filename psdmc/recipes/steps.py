@@ -57,10 +57,10 @@ def stepped(values: Sequence[Scalar], rates: Sequence[Scalar], dt: Scalar) -> li
     return [value + dt * rate for value, rate in zip(values, rates, strict=True)]
 
 
-def turned(frames: Sequence[Frame], q: Array, way: Array) -> Array:
-    """Return the joint positions (k, nq) after a motion from q (k, nq) at constant joint rates. `way` (k, nv) are the
+def turned(frames: Sequence[Frame], q: Array, step: Array) -> Array:
+    """Return the joint positions (k, nq) after a motion from q (k, nq) at constant joint rates. `step` (k, nv) are the
     rates multiplied by the duration."""
-    return columns(integrated(frames, list(q.T), list(way.T)), len(q))
+    return columns(integrated(frames, list(q.T), list(step.T)), len(q))
 
 
 def step_on_arrays(given: Mapping[str, Array]) -> Array:
@@ -94,11 +94,13 @@ def _moved(rows: Rows, dt: Scalar, slopes: Sequence[StepSlopes | None]) -> list[
     """Return the motion of the step's end by rates' rows, times dt."""
     found: list[list[Scalar]] = []
     for own in slopes:
-        block = [[dt * x for x in row] for row in rows[len(found) :][: 1 if own is None else len(own.by_way)]]
+        block = [
+            [dt * x for x in row] for row in rows[len(found) :][: 1 if own is None else len(own.by_step)]
+        ]
         found += (
             block
             if own is None
-            else [[inner_product(w, x) for x in zip(*block, strict=True)] for w in own.by_way]
+            else [[inner_product(w, x) for x in zip(*block, strict=True)] for w in own.by_step]
         )
     return found
 
@@ -131,29 +133,29 @@ def semi_implicit_on_arrays(
     slopes               two arrays (k, nv, nv): derivatives of the new positions by the old positions, and by the
                          displacements (new joint rates times dt)
     """
-    by_start, by_way = slopes
+    by_start, by_step = slopes
     n, h = by_q.shape[-1], dt[..., None]
     unit, none = np.broadcast_to(np.eye(n), by_q.shape), np.zeros_like(by_q)
     kick = np.block([[unit, none], [h * by_q, unit + h * by_qd]])
-    drift = np.block([[by_start, h * by_way], [none, unit]])
+    drift = np.block([[by_start, h * by_step], [none, unit]])
     push = np.concatenate([np.zeros_like(by_tau), h * by_tau], axis=-2)
     return times(drift, kick), times(drift, push)
 
 
-def slopes_on_arrays(frames: Sequence[Frame], way: Array) -> tuple[Array, Array]:
+def slopes_on_arrays(frames: Sequence[Frame], step: Array) -> tuple[Array, Array]:
     """Return the derivatives of joint positions after a motion at constant joint rates, for k states.
 
     The result is two arrays (k, nv, nv). The first has the derivatives by the positions before the motion. The second
-    has the derivatives by the displacements `way` (k, nv), which are the joint rates times the duration.
+    has the derivatives by the displacements `step` (k, nv), which are the joint rates times the duration.
     """
-    count, nv = way.shape
-    by_start, by_way = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
+    count, nv = step.shape
+    by_start, by_step = (np.broadcast_to(np.eye(nv), (count, nv, nv)).copy() for _ in range(2))
     first = first_rates(frames)
-    for i, own in enumerate(step_slopes(frames, list(way.T))):
+    for i, own in enumerate(step_slopes(frames, list(step.T))):
         part = slice(first[i], first[i + 1])
         if own is not None:
-            by_start[:, part, part], by_way[:, part, part] = (matrix(rows, count) for rows in own)
-    return by_start, by_way
+            by_start[:, part, part], by_step[:, part, part] = (matrix(rows, count) for rows in own)
+    return by_start, by_step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,7 +181,7 @@ class CoordinateMaps:
         """
         parts = self._parts(q, qd)
         return _diagonal(
-            [_columns(partial(kind.rates_bent, own, way), kind.nv, len(q)) for kind, own, way in parts]
+            [_columns(partial(kind.rates_bent, own, rates), kind.nv, len(q)) for kind, own, rates in parts]
         )
 
     def tangents(self, q: Array) -> Array:
@@ -193,11 +195,11 @@ class CoordinateMaps:
         return columns([x for joint, own, _ in self._parts(q, None) for x in joint.restored(own)], len(q))
 
     def _parts(self, q: Array, qd: Array | None) -> Iterator[tuple[JointType, list[Array], list[Array]]]:
-        at, way = 0, 0
+        at, rate = 0, 0
         for joint in self.joints:
-            rates = [] if qd is None else list(qd.T[way : way + joint.nv])
+            rates = [] if qd is None else list(qd.T[rate : rate + joint.nv])
             yield joint, list(q.T[at : at + joint.nq]), rates
-            at, way = at + joint.nq, way + joint.nv
+            at, rate = at + joint.nq, rate + joint.nv
 
 
 def _columns(function: Callable[[list[float]], Sequence[Array]], width: int, count: int) -> Array:
@@ -208,8 +210,8 @@ def _columns(function: Callable[[list[float]], Sequence[Array]], width: int, cou
 
 def _diagonal(blocks: Sequence[Array]) -> Array:
     rows, width = (sum(block.shape[axis] for block in blocks) for axis in (1, 2))
-    whole, at, way = np.zeros((len(blocks[0]), rows, width)), 0, 0
+    whole, row, column = np.zeros((len(blocks[0]), rows, width)), 0, 0
     for block in blocks:
-        whole[:, at : at + block.shape[1], way : way + block.shape[2]] = block
-        at, way = at + block.shape[1], way + block.shape[2]
+        whole[:, row : row + block.shape[1], column : column + block.shape[2]] = block
+        row, column = row + block.shape[1], column + block.shape[2]
     return whole

@@ -144,12 +144,12 @@ def moved_by(g: Ingredients, rate: int) -> tuple[Ingredients, tuple[int, ...]]:
     frames, owners = g.frames, joints_of_rates(g.frames)
     moved: set[int] = set()
     for i, frame in enumerate(frames):
-        led_by = (i,) if frame.follows is None else frame.follows.leaders
+        led_by = (i,) if frame.mimic is None else frame.mimic.leaders
         if owners[rate] in led_by or frame.parent in moved:
             moved.add(i)
     kept = with_carriers(frames, moved)
     rates = tuple(k for k, joint in enumerate(owners) if joint in kept)
-    leading = [i for i, frame in enumerate(frames) if frame.follows is None]
+    leading = [i for i, frame in enumerate(frames) if frame.mimic is None]
     q = dict(zip(leading, positions(frames, g.inputs["q"]), strict=True))
     own = [as_tuple(q[i]) for i in kept if i in q]
     part = replace(

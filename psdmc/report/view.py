@@ -42,7 +42,7 @@ from psdmc.robot.mechanism import (
 )
 from psdmc.robot.urdf.dependent_joints import locked
 from psdmc.robot.urdf.read_urdf import read_urdf
-from psdmc.robot.urdf.urdf_draft import bodies_of, body_parameters, on_free_root
+from psdmc.robot.urdf.urdf_draft import bodies_of, body_parameters, on_floating_base
 
 MARK = '<meta name="generator" content="psdmc view">'
 """What every page of `psdmc view` holds."""
@@ -199,7 +199,7 @@ def _own_links(robot: DynamicsModel | LoadedRobot) -> list[Body]:
         return []
     name, options = str(kept.get("source_name", "robot")), kept["options"]
     read = locked(read_urdf(kept["source_text"], name), options.get("lock") or {}, name)
-    read = on_free_root(read) if options.get("floating") else read
+    read = on_floating_base(read) if options.get("floating") else read
     joints, chain = {joint.name: joint for joint in read.joints}, robot.mechanism
     if not set(chain.joint_names) <= set(joints):
         return []  # edited by hand

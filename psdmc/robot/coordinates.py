@@ -77,7 +77,7 @@ def checked_coordinates(coordinates: Sequence[Coordinate], n: int) -> tuple[Coor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Following:
+class MimicMap:
     """Matrices that give the positions and rates of all joints, mimic joints included, from q and qd. They are q_joints
     = shares q + offsets and rates_joints = ratios qd.
 
@@ -91,10 +91,10 @@ class Following:
     ratios: NDArray[np.float64]
 
     @staticmethod
-    def of(coordinates: Sequence[Coordinate], types: Sequence[JointType]) -> Following:
+    def of(coordinates: Sequence[Coordinate], types: Sequence[JointType]) -> MimicMap:
         offsets = [coordinate.offset for coordinate in coordinates]
         lengths = [kind.nq for kind in types]
-        return Following(
+        return MimicMap(
             _shares(coordinates, lengths),
             np.repeat(offsets, lengths),
             _shares(coordinates, [kind.nv for kind in types]),

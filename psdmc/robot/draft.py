@@ -173,7 +173,7 @@ def _loops(
 
 def _drive_values(draft: Draft, options: LoadOptions, source: str) -> list[float | None]:
     """Each joint's drive inertia where it is a parameter (NaN: unknown), None where it is not; a joint of several
-    coordinates, such as a free root, has no drive."""
+    coordinates, such as a floating base, has no drive."""
     own = [
         float(x[DRIVE]) if drive else None for x, drive in zip(draft.parameters, draft.drives, strict=True)
     ]

@@ -100,11 +100,11 @@ def with_linear_loops(robot: Mechanism, follows: Sequence[Sequence[str] | None],
     if kept:  # a passive joint that follows none may belong to one of these
         passive = {i for loop in robot.loops for i in loop.passive} - {*found}
         kept = [replace(loop, passive=() if k else tuple(sorted(passive))) for k, loop in enumerate(kept)]
-    followers = {robot.joints[i].name for i in found}
-    strange = (named if kept else first) - followers
+    mimics = {robot.joints[i].name for i in found}
+    strange = (named if kept else first) - mimics
     if strange:
         raise InputError(
-            f"{source}: loops: joint {shown(min(strange))} cannot follow: found followers {', '.join(sorted(followers))}",
+            f"{source}: loops: joint {shown(min(strange))} cannot follow others: found {', '.join(sorted(mimics))}",
             "name joints of the parallelogram, and leave as many others as it has degrees of freedom",
         )
     coordinates = tuple(_composed(coordinate, found) for coordinate in robot.coordinates)
@@ -132,13 +132,13 @@ def _composed(coordinate: Coordinate, found: Mapping[int, Coordinate]) -> Coordi
 
 def _note(robot: Mechanism, loops: Sequence[Loop], coordinates: Sequence[Coordinate]) -> str:
     names = ", ".join(f"'{loop.name}'" for loop in loops)
-    followers = "; ".join(
+    sums = "; ".join(
         f"{robot.joints[i].name} = {coordinate.in_words(robot.joint_names)}"
         for i, coordinate in enumerate(coordinates)
         if coordinate != robot.coordinates[i]
     )
     return (
-        f"parallelograms {names} are closed in all positions: {followers}. These joints follow as mimic joints do; "
+        f"parallelograms {names} are closed in all positions: {sums}. These joints follow as mimic joints do; "
         "follows = [] in [[loop]] keeps a loop with forces"
     )
 
@@ -184,7 +184,7 @@ def _linear(robot: Mechanism, loop: Loop, columns: Sequence[int], order: Sequenc
             continue
         found = _eliminated(_slopes(gaps, q, count, mine), mine)
         if len(found.pivots) < rank:
-            continue  # a singular position: several ways lead from it
+            continue  # a singular position: several motions lead from it
         whole = np.round(found.rows)
         if np.abs(found.rows - whole).max(initial=0.0) < WHOLE:
             offsets = np.array(
@@ -206,8 +206,8 @@ def _placed(
     for i in path:
         if i in values:
             joint = robot.joints[i]
-            angle, way = joint.type.turn(values[i]), joint.type.slide(values[i])
-            found = _moved(_moved(found, _fixed(joint.placement)), _about_z(angle, way, len(values[i])))
+            angle, height = joint.type.turn(values[i]), joint.type.slide(values[i])
+            found = _moved(_moved(found, _fixed(joint.placement)), _about_z(angle, height, len(values[i])))
     return _moved(found, _fixed(end.placement))
 
 
@@ -226,14 +226,14 @@ def _product(a: Array, b: Array) -> Array:
     return terms[0] + terms[1] + terms[2]
 
 
-def _about_z(angle: Array | None, way: Array | None, count: int) -> Placements:
+def _about_z(angle: Array | None, height: Array | None, count: int) -> Placements:
     turn, shift = np.repeat(np.eye(3)[..., None], count, axis=2), np.zeros((3, count))
     if angle is not None:
         turn[0, 0] = turn[1, 1] = cosine(angle)
         turn[1, 0] = sine(angle)
         turn[0, 1] = -turn[1, 0]
-    if way is not None:
-        shift[2] = way
+    if height is not None:
+        shift[2] = height
     return turn, shift
 
 

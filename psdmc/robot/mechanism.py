@@ -287,14 +287,14 @@ class Mechanism:
         return self.parents == serial_parents(len(self)) and self.tip_body == len(self) - 1
 
     @property
-    def has_free_root(self) -> bool:
+    def has_floating_base(self) -> bool:
         """Whether the first body is on a free joint, with six degrees of freedom."""
         return self.types[0].nv == FREE_RATES and self.parents[0] == BASE
 
     @property
     def base_frame(self) -> str:
         """Return the name of the frame of gravity and placements: base, or world frame if the base floats."""
-        return "world frame" if self.has_free_root else BASE_FRAME
+        return "world frame" if self.has_floating_base else BASE_FRAME
 
     @property
     def own_joints(self) -> tuple[int, ...]:
@@ -312,7 +312,7 @@ class Mechanism:
         return tuple(joint.type for joint in self.leading_joints)
 
     @property
-    def has_followers(self) -> bool:
+    def has_mimic_joints(self) -> bool:
         return len(self.own_joints) < len(self)
 
     @property
@@ -395,7 +395,7 @@ def require_axes(chain: Mechanism, what: str) -> None:
             f"{shown(chain.name)}: {what} is of joints of one coordinate each, and joint {shown(wide.name)}"
             f" {wide.type.verb}",
             "derive the model without a floating base"
-            if chain.has_free_root
+            if chain.has_floating_base
             else "hold this joint: derive the model with --lock JOINT=0",
         )
 

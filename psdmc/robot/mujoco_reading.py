@@ -126,7 +126,7 @@ def _file_torques(mujoco: Any, loaded: LoadedRobot, own: Element, states: States
     for j, name in enumerate(names):
         if model.jnt_type[j] == kinds.mjJNT_HINGE or model.jnt_type[j] == kinds.mjJNT_SLIDE:
             data.qpos[model.jnt_qposadr[j]] = held.get(name, 0.0)
-    # A ball joint's quaternion is x y z w here, and w x y z there; to_mujoco turns the free root's.
+    # A ball joint's quaternion is x y z w here, and w x y z there; to_mujoco turns the floating base's.
     for k, kind in enumerate(chain.types):
         if kind.mujoco == "ball":
             start = sum(one.nq for one in chain.types[:k])

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio
 
 from psdmc.errors import InternalError
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.joints import REVOLUTE, WIDE_TYPES, JointType
 from psdmc.robot.load import LoadedRobot
 from psdmc.robot.mechanism import POINT, Array, Mechanism
@@ -151,8 +151,8 @@ class Reference:
                 for k, weight in enumerate((0.5,) if which else CENTRAL, start=1):
                     for sign in (k, -k):
                         moved = list(states)
-                        way = np.broadcast_to(sign * step, states[1].shape)
-                        moved[which] = moved[which] + way if which else self.integrated(moved[0], way)
+                        change = np.broadcast_to(sign * step, states[1].shape)
+                        moved[which] = moved[which] + change if which else self.integrated(moved[0], change)
                         total += np.copysign(weight / size, weight * sign) * np.concatenate(
                             gradient(*moved), -1
                         )
@@ -161,16 +161,16 @@ class Reference:
         mean: Array = 0.5 * (found + np.swapaxes(found, -1, -2))
         return mean
 
-    def integrated(self, q: Array, way: Array) -> Array:
-        """Return positions (..., nq) after a motion from q at constant rates; `way` is rates times duration."""
+    def integrated(self, q: Array, step: Array) -> Array:
+        """Return positions (..., nq) after a motion from q at constant rates; `step` is rates times duration."""
 
         def moved(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
             return np.asarray(pinocchio.integrate(model, *state))
 
-        return self.each(moved, q, way)
+        return self.each(moved, q, step)
 
-    def integrated_slopes(self, q: Array, way: Array) -> tuple[Array, Array]:
-        """Return the derivatives of `integrated` by q and by `way`, an array (..., nv, nv) each. Changes of positions
+    def integrated_slopes(self, q: Array, step: Array) -> tuple[Array, Array]:
+        """Return the derivatives of `integrated` by q and by `step`, an array (..., nv, nv) each. Changes of positions
         are small motions along the joint rates."""
 
         def slopes(model: pinocchio.Model, data: pinocchio.Data, *state: Array) -> Array:
@@ -178,8 +178,8 @@ class Reference:
                 [pinocchio.dIntegrate(model, *state, which) for which in (pinocchio.ARG0, pinocchio.ARG1)]
             )
 
-        by_start, by_way = np.moveaxis(self.each(slopes, q, way), -3, 0)
-        return by_start, by_way
+        by_start, by_step = np.moveaxis(self.each(slopes, q, step), -3, 0)
+        return by_start, by_step
 
     def coordinate_rates(self, q: Array, qd: Array) -> Array:
         """Return the time derivatives (..., nq) of the coordinates at these rates.
@@ -335,44 +335,44 @@ def pinocchio_version() -> str:
 
 
 # Joints that follow others. Pinocchio's own mimic joints are left alone: half of its algorithms refuse them, and a leader
-# must come before its followers.
+# must come before its mimic joints.
 @dataclass(frozen=True, slots=True, eq=False)
 class OnCoordinates:
     """The dynamics of a robot with mimic joints, computed with Pinocchio. The arrays q, qd, qdd, tau (..., nv) are for
     the joints that follow no other joint."""
 
     free: Reference
-    following: Following
+    mimic_map: MimicMap
 
     @staticmethod
     def of(reference: Reference, robot: Mechanism) -> OnCoordinates:
-        return OnCoordinates(reference, Following.of(robot.coordinates, robot.types))
+        return OnCoordinates(reference, MimicMap.of(robot.coordinates, robot.types))
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        return self.following.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))
+        return self.mimic_map.summed(self.free.inverse_dynamics(*self.on_joints(q, qd, qdd)))
 
     def on_joints(self, q: Array, *rates: Array) -> tuple[Array, ...]:
         """Return positions and rates (..., n) of all n joints from those of the joints that do not follow."""
-        return self.following.positions(q), *map(self.following.rates, rates)
+        return self.mimic_map.positions(q), *map(self.mimic_map.rates, rates)
 
     @property
-    def follows(self) -> bool:
+    def has_mimic_joints(self) -> bool:
         """Whether the robot has mimic joints."""
-        joints, coordinates = self.following.ratios.shape
+        joints, coordinates = self.mimic_map.ratios.shape
         return bool(joints > coordinates)
 
     def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
-        if not self.follows:
+        if not self.has_mimic_joints:
             return self.free.forward_dynamics(q, qd, tau)
         load = tau - self.nonlinear_effects(q, qd)
         return np.asarray(np.linalg.solve(self.mass_matrix(q), load[..., None])[..., 0])
 
     def mass_matrix(self, q: Array) -> Array:
-        whole = self.free.mass_matrix(self.following.positions(q))
-        return self.following.summed(self.following.summed(whole), -2)
+        whole = self.free.mass_matrix(self.mimic_map.positions(q))
+        return self.mimic_map.summed(self.mimic_map.summed(whole), -2)
 
     def nonlinear_effects(self, q: Array, qd: Array) -> Array:
-        return self.following.summed(self.free.nonlinear_effects(*self.on_joints(q, qd)))
+        return self.mimic_map.summed(self.free.nonlinear_effects(*self.on_joints(q, qd)))
 
     def gravity(self, q: Array) -> Array:
-        return self.following.summed(self.free.gravity(self.following.positions(q)))
+        return self.mimic_map.summed(self.free.gravity(self.mimic_map.positions(q)))

@@ -117,7 +117,7 @@ def _urdf_model(loaded: LoadedRobot) -> pinocchio.Model:
     """The file as Pinocchio reads it, all but the chain's joints locked at neutral, seen from the base."""
     chain = loaded.mechanism
     free = chain.joint_names[0] if loaded.options.floating else None
-    whole = pinocchio_model(loaded.source_text, loaded.source_name, free_root=free)
+    whole = pinocchio_model(loaded.source_text, loaded.source_name, root_joint=free)
     held = held_positions(
         read_urdf(loaded.source_text, loaded.source_name), loaded.options.lock, loaded.source_name
     )

@@ -15,7 +15,7 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.random_states import random_parameters, states_of
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.load import LoadedRobot, load_robot_text
 from psdmc.robot.mechanism import BASE, PARAMETERS_PER_LINK, Array, Mechanism, Placement
 from psdmc.robot.mujoco_reading import NotCompared, mujoco_torques, mujoco_version
@@ -160,7 +160,7 @@ def _forward(robot: OnCoordinates, q: Array, qd: Array, qdd: Array, tau: Array, 
 def _placements(model: DynamicsModel, written: Reference, angles: Array) -> tuple[CheckRow, ...]:
     """Rows for the placements of links and tip and for gravity, within the angles that snapping reports."""
     chain = model.mechanism
-    q = Following.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0])
+    q = MimicMap.of(chain.coordinates, chain.types).positions(_states(model.mechanism)[0])
     links = [joint.link_name for joint in chain.joints]
     expected = written.poses(q, links)
     above = (*chain.parents, chain.tip_body)
@@ -193,9 +193,9 @@ def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) ->
     """The row for torques of the source's own bodies, compared with MuJoCo's."""
     states = _states(model.mechanism)
     try:
-        following = Following.of(loaded.mechanism.coordinates, loaded.mechanism.types)
-        free = (following.positions(states[0]), *map(following.rates, states[1:]))
-        expected = following.summed(mujoco_torques(loaded, *free))
+        mimic_map = MimicMap.of(loaded.mechanism.coordinates, loaded.mechanism.types)
+        free = (mimic_map.positions(states[0]), *map(mimic_map.rates, states[1:]))
+        expected = mimic_map.summed(mujoco_torques(loaded, *free))
     except NotCompared as reason:
         return CheckRow("inverse dynamics", MUJOCO, np.nan, None, f"not compared: {reason}")
     tau = model.torques_for(model.B @ loaded.mechanism.parameters.reshape(-1), *states)
@@ -211,7 +211,7 @@ def _against_mujoco(model: DynamicsModel, loaded: LoadedRobot, angles: Array) ->
 def _bound(robot: OnCoordinates, angles: Array, states: tuple[Array, Array, Array]) -> Array:
     """(nv,) what the angles can change of each coordinate's torque."""
     bound = torque_bound(robot.free, angles, *robot.on_joints(*states))
-    return np.asarray(bound @ np.abs(robot.following.ratios))
+    return np.asarray(bound @ np.abs(robot.mimic_map.ratios))
 
 
 def placement_errors(found: Array, expected: Array, above: Sequence[int]) -> Array:

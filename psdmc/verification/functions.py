@@ -177,13 +177,13 @@ def _lacking(model: DynamicsModel, recipe: Recipe, robot: OnCoordinates, solvabl
         return "the mass matrix is singular"
     if "second_derivatives" in recipe.signature.name and model.nv > MOST_RATES:
         return f"differences of Pinocchio's derivatives take long with more than {MOST_RATES} joint rates"
-    # From positions to positions, or to the way between them.
+    # From positions to positions, or to the step between them.
     places = not recipe.signature.theta and all(
         q.axes in (("nq",), ("nv",), ("nv", "nq")) for q in recipe.signature.outputs
     )
-    if robot.follows and places:
-        return "Pinocchio's positions are of every joint, followers included"
-    if recipe.needs is Needs.POSITIVE_MASS and robot.follows:
+    if robot.has_mimic_joints and places:
+        return "Pinocchio's positions are of every joint, mimic joints included"
+    if recipe.needs is Needs.POSITIVE_MASS and robot.has_mimic_joints:
         return "Pinocchio solves no robots with mimic joints"
     return None
 
@@ -239,12 +239,12 @@ def _rounding(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) 
 
 def _expected(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) -> Mapping[str, Array]:
     """Pinocchio's values. For a robot with mimic joints, they are those of all joints, summed along the axes of rates."""
-    if not robot.follows:
+    if not robot.has_mimic_joints:
         return recipe.pinocchio(robot.free, given)
     joints = dict(given)
     for quantity in recipe.signature.inputs:
         if quantity.axes in (("nq",), ("nv",)):
-            move = robot.following.positions if quantity.name == Q.name else robot.following.rates
+            move = robot.mimic_map.positions if quantity.name == Q.name else robot.mimic_map.rates
             joints[quantity.name] = move(given[quantity.name])
     axes = {quantity.name: quantity.axes for quantity in recipe.signature.outputs}
     if recipe.times_theta:
@@ -258,10 +258,10 @@ def _expected(recipe: Recipe, robot: OnCoordinates, given: Mapping[str, Array]) 
 def _summed(robot: OnCoordinates, values: Array, axes: Sequence[str]) -> Array:
     for k, axis in enumerate(axes):
         if axis in ("nq", "nv"):
-            values = robot.following.summed(values, k - len(axes))
+            values = robot.mimic_map.summed(values, k - len(axes))
         elif axis == "nxa":
             parts = np.split(values, 3, axis=k - len(axes))
-            values = np.concatenate([robot.following.summed(x, k - len(axes)) for x in parts], k - len(axes))
+            values = np.concatenate([robot.mimic_map.summed(x, k - len(axes)) for x in parts], k - len(axes))
     return values
 
 

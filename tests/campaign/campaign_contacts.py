@@ -110,7 +110,7 @@ class ContactRobot:
         loops = [len(loop.rows) for loop in robot.loops]
         return (
             f"joints {self.kinds}, {robot.nv} rates, parents {robot.parents}, contacts of {robot.rows_of_contacts} rows, "
-            f"loops of {loops} rows{', floating' if robot.has_free_root else ''}"
+            f"loops of {loops} rows{', floating' if robot.has_floating_base else ''}"
         )
 
 
@@ -255,7 +255,7 @@ def _of_base(robot: ContactRobot, theirs: Reference, given: dict[str, Array]) ->
     """Condition numbers of the equations of inverse dynamics, without singular values that count as zero."""
     found, mechanism = [], robot.loaded.mechanism
     for rows in _jacobian(theirs, mechanism, given):
-        parts = [rows[:, :6]] if mechanism.has_free_root else []
+        parts = [rows[:, :6]] if mechanism.has_floating_base else []
         if theirs.passive:
             parts.append(rows[-sum(map(len, mechanism.rows_of_loops)) :][:, list(theirs.passive)])
         values = [np.linalg.svd(part, compute_uv=False) for part in parts if part.size]

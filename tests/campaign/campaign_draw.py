@@ -21,6 +21,6 @@ def described(robot: RandomRobot | ContactRobot) -> str:
         return robot.described
     tilts = f", tilts {min(robot.tilts):.1g} to {max(robot.tilts):.1g} rad" if robot.tilts else ""
     mixed = ", of many scales" if robot.is_mixed else ""
-    mimic = f", {len(robot.follows)} of them mimic joints" if robot.follows else ""
+    mimic = f", {len(robot.mimics)} of them mimic joints" if robot.mimics else ""
     options = "".join(f", {name} {value}" for name, value in robot.options.items())
     return f"{len(robot.joints)} joints{mimic}, {robot.style}{tilts}{mixed}{options}"

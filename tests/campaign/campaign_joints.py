@@ -11,13 +11,13 @@ from campaign_robots import RandomRobot
 Array = np.ndarray
 
 ROOT_Q, ROOT_RATES = 7, 6
-"""Coordinates (position, quaternion xyzw) and rates (linear, angular, along the root's own axes) of a free root: first in
-every vector."""
+"""Coordinates (position, quaternion xyzw) and rates (linear, angular, along the root's own axes) of a floating base: first
+in every vector."""
 
 
 @dataclass(frozen=True, slots=True)
 class Joints:
-    """q_joint = ratios q + offsets for joints of one coordinate; a free root comes before them.
+    """q_joint = ratios q + offsets for joints of one coordinate; a floating base comes before them.
 
     names        (joints) as the oracle has them
     coordinates  (coordinates) names of joints that neither follow another nor are held, in the order of `names`
@@ -36,15 +36,15 @@ class Joints:
         """By the robot's own mimic joints and held ones; without a robot every joint is a coordinate."""
         if robot is None:
             return Joints(tuple(names), tuple(names), np.eye(len(names)), np.zeros(len(names)), False)
-        followed = [robot.follower(name) for name in names]
-        own = [name for name in names if name not in robot.follows and name not in robot.held]
+        followed = [robot.coordinate_of(name) for name in names]
+        own = [name for name in names if name not in robot.mimics and name not in robot.held]
         ratios = np.array([[one.ratio * (one.leader == name) for name in own] for one in followed])
         offsets = np.array([one.offset for one in followed])
         return Joints(tuple(names), tuple(own), ratios, offsets, robot.is_floating)
 
     @property
     def root(self) -> tuple[int, int]:
-        """How many coordinates and rates the free root has."""
+        """How many coordinates and rates the floating base has."""
         return (ROOT_Q, ROOT_RATES) if self.is_floating else (0, 0)
 
     @property
@@ -65,7 +65,7 @@ class Joints:
         return np.hstack([qd[:, :first], qd[:, first:] @ self.ratios.T])
 
     def summed(self, efforts: Array) -> Array:
-        """(..., nv) from (..., all rates): those of followers times their ratios."""
+        """(..., nv) from (..., all rates): those of mimic joints times their ratios."""
         first = self.root[1]
         return np.concatenate([efforts[..., :first], efforts[..., first:] @ self.ratios], axis=-1)
 

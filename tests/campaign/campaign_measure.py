@@ -167,7 +167,7 @@ def _of_chain(
 
 
 def _expands(chain: Mechanism) -> bool:
-    if chain.has_followers or not all(kind.about_z for kind in chain.types):
+    if chain.has_mimic_joints or not all(kind.about_z for kind in chain.types):
         return False
     return len(chain) <= (EXPANDED_JOINTS if chain.is_serial else EXPANDED_BODIES)
 
@@ -196,7 +196,7 @@ def _of_accelerations(model: DynamicsModel, reference: Reference, tau: Array) ->
     q, qd, _ = reference.few
     robot = RobotOnArrays.of(model, model.known_theta_b())
     errors = {"forward_dynamics": reference.acceleration_error(robot.accelerations(q, qd, tau))}
-    if not model.mechanism.has_followers:
+    if not model.mechanism.has_mimic_joints:
         given = (list(vectors.T) for vectors in (q, qd, tau))
         found = forward_dynamics(robot.frames, robot.bodies, robot.drives, *given, robot.base_acceleration)
         errors["articulated bodies"] = reference.acceleration_error(columns(found[0], len(q)))

@@ -29,7 +29,7 @@ class Pinocchio:
         """The file as Pinocchio reads it; joints that are held are fixed where they are."""
         free = [pinocchio.JointModelFreeFlyer()] if robot.is_floating else []
         whole = pinocchio.buildModelFromXML(robot.text, *free)
-        held = {name: one.offset for name in robot.joints if not (one := robot.follower(name)).ratio}
+        held = {name: one.offset for name in robot.joints if not (one := robot.coordinate_of(name)).ratio}
         if not held:
             return Pinocchio(whole, robot)
         at = pinocchio.neutral(whole)
@@ -156,8 +156,8 @@ class MuJoCo:
 
 
 def _about_world(turned: Array, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-    """States with a free root as MuJoCo has them: quaternion wxyz, the origin's velocity and acceleration along the world's
-    axes; angular ones stay along the root's own."""
+    """States with a floating base as MuJoCo has them: quaternion wxyz, the origin's velocity and acceleration along the
+    world's axes; angular ones stay along the root's own."""
     linear, angular = qd[:, :3], qd[:, 3:6]
     q, qd, qdd = q.copy(), qd.copy(), qdd.copy()
     q[:, 3:7] = q[:, [6, 3, 4, 5]]

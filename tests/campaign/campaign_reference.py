@@ -12,14 +12,14 @@ Array = np.ndarray
 States = tuple[Array, Array, Array]
 
 RANGES = (np.pi, 3.0, 5.0)
-"""q (rad or m), qd and qdd are drawn from plus or minus these; a free root's quaternions are of any direction."""
+"""q (rad or m), qd and qdd are drawn from plus or minus these; a floating base's quaternions are of any direction."""
 
 FEW = 50
 """States at which the mass matrix, nonlinear effects, gravity and forward dynamics are compared."""
 
 
 def random_states(seed: int, n: int, count: int, is_floating: bool = False) -> States:
-    """Of n joints of one coordinate, a free root before them where the robot has one."""
+    """Of n joints of one coordinate, a floating base before them where the robot has one."""
     rng = np.random.default_rng([20, seed])
     q, qd, qdd = (limit * rng.uniform(-1.0, 1.0, (count, n)) for limit in RANGES)
     if not is_floating:

@@ -52,7 +52,7 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True)
-class Follows:
+class Mimic:
     """q = ratio q_leader + offset"""
 
     leader: str
@@ -80,7 +80,7 @@ class RandomRobot:
     tilts: tuple[float, ...]
     is_mixed: bool
     options: Mapping[str, Any] = field(default_factory=dict)
-    follows: Mapping[str, Follows] = field(default_factory=dict)
+    mimics: Mapping[str, Mimic] = field(default_factory=dict)
     held: Mapping[str, float] = field(default_factory=dict)
     is_light: bool = False
 
@@ -88,15 +88,15 @@ class RandomRobot:
     def is_floating(self) -> bool:
         return bool(self.options.get("floating"))
 
-    def follower(self, joint: str) -> Follows:
+    def coordinate_of(self, joint: str) -> Mimic:
         """What moves a joint in the end: a joint that follows none, itself maybe, or one that is held, with ratio 0."""
         if joint in self.held:
-            return Follows(joint, 0.0, self.held[joint])
-        if joint not in self.follows:
-            return Follows(joint, 1.0, 0.0)
-        own = self.follows[joint]
-        first = self.follower(own.leader)
-        return Follows(first.leader, own.ratio * first.ratio, own.ratio * first.offset + own.offset)
+            return Mimic(joint, 0.0, self.held[joint])
+        if joint not in self.mimics:
+            return Mimic(joint, 1.0, 0.0)
+        own = self.mimics[joint]
+        first = self.coordinate_of(own.leader)
+        return Mimic(first.leader, own.ratio * first.ratio, own.ratio * first.offset + own.offset)
 
 
 def random_robot(seed: int) -> RandomRobot:

@@ -1,5 +1,5 @@
 """Random robots that branch, as URDF text and options, one per seed: limbs of the links and joints that chains are made
-of, plates fixed anywhere, links without a body, joints that follow others or are locked, free roots, chains cut out.
+of, plates fixed anywhere, links without a body, joints that follow others or are locked, floating bases, chains cut out.
 
 Names tell nothing of what hangs on what, and the file has its parts in any order.
 """
@@ -15,7 +15,7 @@ from campaign_robots import (
     KIND_SHARES,
     KINDS,
     STYLES,
-    Follows,
+    Mimic,
     RandomRobot,
     Scale,
     body_link,
@@ -59,7 +59,7 @@ class Drawing:
     tilts: list[float] = field(default_factory=list)
     parts: list[str] = field(default_factory=list)
     options: dict[str, Any] = field(default_factory=dict)
-    follows: dict[int, Follows] = field(default_factory=dict)
+    mimics: dict[int, Mimic] = field(default_factory=dict)
     held: dict[str, float] = field(default_factory=dict)
     is_light: bool = False
 
@@ -88,7 +88,7 @@ def random_tree(seed: int) -> RandomRobot:
     joints = drawing.joints
     return RandomRobot(
         seed, robot_text(seed, drawing.parts), style, tuple(joints), tuple(drawing.tilts), is_mixed,
-        drawing.options, {joints[k]: one for k, one in drawing.follows.items()}, drawing.held,
+        drawing.options, {joints[k]: one for k, one in drawing.mimics.items()}, drawing.held,
         drawing.is_light,
     )  # fmt: skip
 
@@ -110,7 +110,7 @@ def _options(rng: np.random.Generator, drawing: Drawing) -> None:
         drawing.options["floating"] = True
     if rng.random() < LOCKED:
         _lock(rng, drawing)
-    if not drawing.options and not drawing.follows and rng.random() < CUT:
+    if not drawing.options and not drawing.mimics and rng.random() < CUT:
         _cut(rng, drawing)
 
 
@@ -125,20 +125,20 @@ def _follow(rng: np.random.Generator, drawing: Drawing) -> None:
             0.0 if rng.random() < STILL else float(np.round(rng.uniform(0.2, 2.0) * rng.choice([-1, 1]), 3))
         )
         offset = float(np.round(rng.uniform(-0.5, 0.5), 3)) if rng.random() < 0.5 else 0.0
-        drawing.follows[joint] = Follows(drawing.joints[leader], ratio, offset)
+        drawing.mimics[joint] = Mimic(drawing.joints[leader], ratio, offset)
 
 
 def _led_by(drawing: Drawing, joint: int) -> list[int]:
     """The joint and all that it follows."""
-    if joint not in drawing.follows:
+    if joint not in drawing.mimics:
         return [joint]
-    return [joint, *_led_by(drawing, drawing.joints.index(drawing.follows[joint].leader))]
+    return [joint, *_led_by(drawing, drawing.joints.index(drawing.mimics[joint].leader))]
 
 
 def _lock(rng: np.random.Generator, drawing: Drawing) -> None:
     """One or two joints, as long as two others stay that follow none."""
     for joint in rng.permutation(len(drawing.names))[: int(rng.integers(1, 3))].tolist():
-        own = [k for k in range(len(drawing.names)) if k not in drawing.follows]
+        own = [k for k in range(len(drawing.names)) if k not in drawing.mimics]
         left = [k for k in own if drawing.joints[k] not in drawing.held and k != joint]
         if len(left) >= 2:
             drawing.held[drawing.joints[joint]] = float(np.round(rng.uniform(-1.5, 1.5), 3))
@@ -169,7 +169,7 @@ def _bodies(rng: np.random.Generator, drawing: Drawing, style: str, scales: Sequ
             parts.append(body_link(rng, f"plate{name}", 0.4 * size, scale))
             parent = rng.choice([parent, f"plate{name}"])
         joint = moving_joint(rng, name, kind, parent, style, scale, drawing.tilts)
-        parts.append(joint.replace("</joint>", _mimic(drawing.follows.get(k)) + "</joint>"))
+        parts.append(joint.replace("</joint>", _mimic(drawing.mimics.get(k)) + "</joint>"))
         if k in drawing.parents and rng.random() < LIGHT:
             drawing.is_light = True
             parts.append(f"<link name='link{name}'/>")
@@ -177,8 +177,8 @@ def _bodies(rng: np.random.Generator, drawing: Drawing, style: str, scales: Sequ
             parts.append(body_link(rng, f"link{name}", size, scales[k]))
 
 
-def _mimic(follows: Follows | None) -> str:
-    if follows is None:
+def _mimic(mimics: Mimic | None) -> str:
+    if mimics is None:
         return ""
-    offset = f" offset='{follows.offset!r}'" if follows.offset else ""
-    return f"<mimic joint='{follows.leader}' multiplier='{follows.ratio!r}'{offset}/>"
+    offset = f" offset='{mimics.offset!r}'" if mimics.offset else ""
+    return f"<mimic joint='{mimics.leader}' multiplier='{mimics.ratio!r}'{offset}/>"

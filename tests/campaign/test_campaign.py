@@ -168,11 +168,11 @@ def test_a_random_robot_lowered_and_compiled(mixed: bool, tmp_path, monkeypatch:
 
 @pytest.mark.slow
 def test_a_random_tree_lowered_and_compiled(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A free root, and joints that follow others."""
+    """A floating base, and joints that follow others."""
     monkeypatch.setenv("PSDMC_CACHE_DIR", str(tmp_path))
     robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 1000))
     seed = next(
-        r.seed for r in robots if len(r.joints) == 4 and r.is_floating and r.follows and not r.is_light
+        r.seed for r in robots if len(r.joints) == 4 and r.is_floating and r.mimics and not r.is_light
     )
     assert_right_when_lowered(seed)
 
@@ -184,10 +184,10 @@ def test_trees_are_of_all_kinds() -> None:
     assert {name for robot in robots for name in robot.options} == {"lock", "floating", "base", "tip"}
     assert any(robot.is_light for robot in robots)
     assert any(robot.is_mixed for robot in robots)
-    followers = [(robot, one) for robot in robots for one in robot.follows.values()]
-    assert any(one.leader in robot.follows for robot, one in followers)
-    assert any(one.ratio == 0.0 for _, one in followers)
-    assert any(robot.joints.index(one.leader) > 0 and one.leader in robot.held for robot, one in followers)
+    mimics = [(robot, one) for robot in robots for one in robot.mimics.values()]
+    assert any(one.leader in robot.mimics for robot, one in mimics)
+    assert any(one.ratio == 0.0 for _, one in mimics)
+    assert any(robot.joints.index(one.leader) > 0 and one.leader in robot.held for robot, one in mimics)
     text = "".join(robot.text for robot in robots)
     assert all(f"type='{kind}'" in text for kind in ("revolute", "continuous", "prismatic", "fixed"))
 
@@ -201,7 +201,7 @@ def test_an_option_that_psdmc_forgets_is_seen(
         return load_robot_text(text, kind, **left)
 
     robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 300))
-    robot = next(r for r in robots if forgotten[-1] in r.options and not r.follows)
+    robot = next(r for r in robots if forgotten[-1] in r.options and not r.mimics)
     monkeypatch.setattr("campaign_measure.load_robot_text", read)
     with pytest.raises((AssertionError, InputError), match=r"coordinates|shape"):
         measured(robot.seed, STATES, lowered=False)
@@ -209,9 +209,9 @@ def test_an_option_that_psdmc_forgets_is_seen(
 
 def test_a_ratio_that_is_a_little_off_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     robots = map(random_tree, range(FIRST_TREE, FIRST_TREE + 300))
-    robot = next(r for r in robots if any(one.ratio for one in r.follows.values()) and not r.options)
-    follows = {name: replace(one, ratio=one.ratio * (1.0 + 1e-9)) for name, one in robot.follows.items()}
-    monkeypatch.setattr("campaign_measure.robot_of", lambda seed: replace(robot, follows=follows))
+    robot = next(r for r in robots if any(one.ratio for one in r.mimics.values()) and not r.options)
+    mimics = {name: replace(one, ratio=one.ratio * (1.0 + 1e-9)) for name, one in robot.mimics.items()}
+    monkeypatch.setattr("campaign_measure.robot_of", lambda seed: replace(robot, mimics=mimics))
     assert failures(measured(robot.seed, STATES, lowered=False).errors)
 
 
@@ -240,7 +240,7 @@ def test_robots_with_contacts_and_loops_are_of_all_kinds() -> None:
     robots = [random_contact_robot(FIRST_CONTACTS + k) for k in (3, 4, 6, 7)]
     assert {*"".join(robot.kinds for robot in robots)} == {*"RPS"}
     mechanisms = [robot.loaded.mechanism for robot in robots]
-    assert {robot.has_free_root for robot in mechanisms} == {True, False}
+    assert {robot.has_floating_base for robot in mechanisms} == {True, False}
     assert {len(robot.loops) for robot in mechanisms} == {0, 1, 2}
     assert {len(robot.contacts) for robot in mechanisms} == {1, 2, 3}
     assert {rows for robot in mechanisms for rows in robot.rows_of_contacts} == {3, 6}

@@ -13,10 +13,10 @@ from random_trees import TREES, RandomTree
 from psdmc.derivation.derive import derive_model
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.coordinates import on_coordinates
-from psdmc.dynamics.frames import Follows
+from psdmc.dynamics.frames import Mimic
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.errors import InputError
-from psdmc.robot.coordinates import Coordinate, Following, leaders
+from psdmc.robot.coordinates import Coordinate, MimicMap, leaders
 from psdmc.robot.mechanism import Placement
 
 FINGERS = (Coordinate(0), Coordinate(1), Coordinate(1, -0.7, 0.2), Coordinate(3), Coordinate(1, 1.3, -0.4))
@@ -26,7 +26,7 @@ PARENTS = (-1, 0, 0, 1, 2)
 
 
 @pytest.mark.parametrize("kinds", ["RRRRR", "RPPRP", "PRRPR"])
-def test_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
+def test_mimic_joints_are_pinocchios(kinds: str) -> None:
     tree = RandomTree(21, PARENTS, kinds)
     model = pin.buildModelFromXML(as_urdf(tree, FINGERS), mimic=True)
     model.gravity.linear = tree.gravity.copy()
@@ -34,16 +34,16 @@ def test_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
     assert (model.nq, model.nv) == (3, 3)
     order = [model.joints[model.getJointId(f"joint{i}")].idx_v for i in leaders(FINGERS)]
     still = [0.0] * tree.n
-    following = Following.of(FINGERS, tree.mechanism().types)
+    mimic_map = MimicMap.of(FINGERS, tree.mechanism().types)
     for q, qd, qdd in np.random.default_rng(0).uniform(-2.0, 2.0, (20, 3, 3)):
-        states = (following.positions(q), following.rates(qd), following.rates(qdd))
+        states = (mimic_map.positions(q), mimic_map.rates(qd), mimic_map.rates(qdd))
         theirs = np.zeros((3, 3))
         theirs[:, order] = q, qd, qdd
         tau = inverse_dynamics(tree.frames, tree.bodies, still, *states, tree.up)
         expected = pin.rnea(model, data, *theirs)[order]
-        np.testing.assert_allclose(following.summed(np.array(tau)), expected, rtol=1e-11)
+        np.testing.assert_allclose(mimic_map.summed(np.array(tau)), expected, rtol=1e-11)
         of_joints = mass_matrix(tree.frames, tree.bodies, still, states[0])
-        M = following.summed(following.summed(np.array(of_joints)), axis=0)
+        M = mimic_map.summed(mimic_map.summed(np.array(of_joints)), axis=0)
         upper = np.triu(pin.crba(model, data, theirs[0]))
         whole = upper + np.triu(upper, 1).T
         np.testing.assert_allclose(M, whole[np.ix_(order, order)], rtol=1e-11, atol=1e-12)
@@ -58,17 +58,17 @@ def test_held_joints_stand_still() -> None:
     free = list(leaders(coordinates))
     assert free == [0, 1, 3, 5]
     q, qd, qdd = np.random.default_rng(1).uniform(-2.0, 2.0, (3, len(free)))
-    following = Following.of(coordinates, tree.mechanism().types)
-    states = (following.positions(q), following.rates(qd), following.rates(qdd))
+    mimic_map = MimicMap.of(coordinates, tree.mechanism().types)
+    states = (mimic_map.positions(q), mimic_map.rates(qd), mimic_map.rates(qdd))
     tau = inverse_dynamics(tree.frames, tree.bodies, tree.drives, *states, tree.up)
     whole = np.array([[held.get(i, 0.0) for i in range(tree.n)], np.zeros(tree.n), np.zeros(tree.n)])
     whole[:, free] = q, qd, qdd
     (expected,) = tree.each(pin.rnea, *whole[:, None])
-    np.testing.assert_allclose(following.summed(np.array(tau)), expected[free], rtol=1e-11)
+    np.testing.assert_allclose(mimic_map.summed(np.array(tau)), expected[free], rtol=1e-11)
 
 
 @pytest.mark.parametrize("kinds", ["RRRRR", "RPPRP", "PRRPR"])
-def test_models_of_followers_are_pinocchios_mimic_joints(kinds: str) -> None:
+def test_models_with_mimic_joints_are_pinocchios(kinds: str) -> None:
     """Ratios between angles and lengths too; in a chain of metres, whose unit is not one."""
     tree = RandomTree(21, PARENTS, kinds)
     tree.places = [Placement(place.rotation, 8.0 * place.translation) for place in tree.places]
@@ -103,7 +103,7 @@ def test_a_joint_that_is_held_is_for_readers_to_merge() -> None:
         ((Coordinate(0), Coordinate(7), Coordinate(2)), "joint 1 follows joint 7"),
     ],
 )
-def test_rings_and_followers_of_followers_are_no_coordinates(coordinates, message: str) -> None:
+def test_rings_and_mimics_of_mimics_are_no_coordinates(coordinates, message: str) -> None:
     chain = RandomTree(24, (-1, 0, 1), "RRR").mechanism()
     with pytest.raises(ValueError, match=message):
         replace(chain, coordinates=coordinates)
@@ -128,7 +128,7 @@ class Noted:
 def test_mimic_joints_values_are_computed_in_one_order_in_all_processes() -> None:
     """It is the order of the generated code. The order of a set of names changes with PYTHONHASHSEED."""
     first, second, *_ = RandomTree(21, PARENTS, "RRRRR").frames
-    frames, noted = (first, replace(second, follows=Follows(((0, 2.0),), 0.0))), []
+    frames, noted = (first, replace(second, mimic=Mimic(((0, 2.0),), 0.0))), []
     names = ("q", "qd", "qdd", "qd_r", "qdd_r", "weights")
 
     @on_coordinates()

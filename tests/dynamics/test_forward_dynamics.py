@@ -11,7 +11,7 @@ from random_trees import CHOICES, COUNT, TREES, RandomTree, columns, on_trees
 
 from psdmc.dynamics.composite_body import mass_matrix
 from psdmc.dynamics.forward_dynamics import forward_dynamics
-from psdmc.dynamics.frames import Follows
+from psdmc.dynamics.frames import Mimic
 from psdmc.dynamics.momentum_and_energy import momentum_matrix, total_momentum
 from psdmc.dynamics.newton_euler import inverse_dynamics
 from psdmc.dynamics.solve import SingularMatrix, factorize
@@ -76,16 +76,16 @@ def test_a_joint_that_moves_no_inertia_is_named() -> None:
 
 def test_joints_that_follow_others_are_left_to_the_mass_matrix() -> None:
     tree = RandomTree(35, TREES["a fork"], "RRR")
-    frames = [*tree.frames[:2], replace(tree.frames[2], follows=Follows(((1, -0.5),), 0.1))]
+    frames = [*tree.frames[:2], replace(tree.frames[2], mimic=Mimic(((1, -0.5),), 0.1))]
     with pytest.raises(ValueError, match="follows another"):
         forward_dynamics(frames, tree.bodies, tree.drives, [0.1] * 2, [0.1] * 2, [0.0] * 2, tree.up)
 
 
 @pytest.mark.parametrize("kinds", ["RRPRRR", "FRPRRR"])
-def test_momentum_columns_of_followers_are_their_leaders(kinds: str) -> None:
+def test_momentum_columns_of_mimic_joints_are_their_leaders(kinds: str) -> None:
     """By the momentum of all bodies at unit rates of the coordinates."""
     tree = RandomTree(36, TREES["a trunk with two arms"], kinds, 0.5)
-    frames = [*tree.frames[:5], replace(tree.frames[5], follows=Follows(((3, -0.7),), 0.2))]
+    frames = [*tree.frames[:5], replace(tree.frames[5], mimic=Mimic(((3, -0.7),), 0.2))]
     q = tree.motion(1)[0][0][:-1]
     found = np.array(momentum_matrix(frames, tree.bodies, q), float)
     assert found.shape == (6, tree.nv - 1)

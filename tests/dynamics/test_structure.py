@@ -16,8 +16,8 @@ TREES = {
     "a chain": ((-1, 0, 1, 2, 3), "RPRRP", 0.0),
     "a chain with right angles": ((-1, 0, 1, 2, 3), "RPRRP", 0.7),
     "branches on the base": ((-1, 0, -1, 2, 2), "RRPRR", 0.5),
-    "a free root": ((-1, 0, 1, 0, 3, 0), "FRRRPR", 0.0),
-    "a free root, right angles": ((-1, 0, 1, 0, 3, 0), "FRRRPR", 0.7),
+    "a floating base": ((-1, 0, 1, 0, 3, 0), "FRRRPR", 0.0),
+    "a floating base, right angles": ((-1, 0, 1, 0, 3, 0), "FRRRPR", 0.7),
     "joints of several coordinates": ((-1, 0, 1, 0, 3), "LSRTR", 0.3),
 }
 STATES = 100

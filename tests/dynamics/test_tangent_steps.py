@@ -30,7 +30,7 @@ class One:
     """A frame that has a joint and nothing else."""
 
     def __init__(self, joint) -> None:
-        self.joint, self.follows = joint, None
+        self.joint, self.mimic = joint, None
 
 
 def exact(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

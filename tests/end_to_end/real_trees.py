@@ -11,7 +11,7 @@ import pinocchio as pin
 from extended_tree import ROOT_V, ExtendedTree
 from installed import in_wheel
 
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.load import LoadedRobot, load_robot
 
 ROBOTS = {
@@ -56,7 +56,7 @@ class RealTree:
         root = [pin.JointModelFreeFlyer()] if is_floating else []
         self.oracle = pin.buildModelFromXML(text, *root, mimic=True)
         self.free = pin.buildModelFromXML(text, *root)
-        self.following = Following.of(self.loaded.mechanism.coordinates, self.loaded.mechanism.types)
+        self.mimic_map = MimicMap.of(self.loaded.mechanism.coordinates, self.loaded.mechanism.types)
         n = self.oracle.nv
         self.q, self.qd, self.qdd = (
             np.random.default_rng(len(name)).uniform(-1.0, 1.0, (3, COUNT, n))
@@ -118,22 +118,22 @@ class RealTree:
 
     @cached_property
     def kinetic(self) -> Array:
-        q, qd = self.following.positions(self.q), self.following.rates(self.qd)
+        q, qd = self.mimic_map.positions(self.q), self.mimic_map.rates(self.qd)
         return self.each(pin.computeKineticEnergy, q, qd, model=self.free)
 
     @cached_property
     def potential(self) -> Array:
         """Above that where every joint is at zero."""
-        neutral = self.following.positions(self.neutral)
+        neutral = self.mimic_map.positions(self.neutral)
         at_zero = pin.computePotentialEnergy(self.free, self.free.createData(), neutral)
-        q = self.following.positions(self.q)
+        q = self.mimic_map.positions(self.q)
         return self.each(pin.computePotentialEnergy, q, model=self.free) - at_zero
 
     @cached_property
     def momentum(self) -> Array:
         """The centroidal momentum matrix, (count, 6, nv)."""
-        q = self.following.positions(self.q)
-        return self.following.summed(self.each(pin.computeCentroidalMap, q, model=self.free))
+        q = self.mimic_map.positions(self.q)
+        return self.mimic_map.summed(self.each(pin.computeCentroidalMap, q, model=self.free))
 
     @cached_property
     def condition(self) -> float:
@@ -151,9 +151,9 @@ class RealTree:
             if self.extended.is_floating:
                 turn = rng.normal(size=4)
                 q = np.hstack([q[:3], turn / np.linalg.norm(turn), q[ROOT_V:]])
-            joints = self.following.positions(q), self.following.rates(qd), self.following.rates(qdd)
+            joints = self.mimic_map.positions(q), self.mimic_map.rates(qd), self.mimic_map.rates(qdd)
             rows = pin.computeJointTorqueRegressor(self.free, data, *joints)
-            factor = np.linalg.qr(np.vstack([factor, self.following.ratios.T @ rows]), mode="r")
+            factor = np.linalg.qr(np.vstack([factor, self.mimic_map.ratios.T @ rows]), mode="r")
         sizes = np.linalg.norm(factor, axis=0)
         sizes[np.repeat([body.mass == 0.0 for body in self.free.inertias.tolist()[1:]], 10)] = 0.0
         kept = factor[:, sizes > 1e-13 * sizes.max()]

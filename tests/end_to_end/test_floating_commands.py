@@ -1,4 +1,4 @@
-"""A quadruped on a free root, from its URDF to a tested library, as a user types it; and from Python."""
+"""A quadruped on a floating base, from its URDF to a tested library, as a user types it; and from Python."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("words", "expected", "said"), REFUSED, ids=lambda value: str(value)[:40])
-def test_what_is_not_of_free_roots_is_refused_in_a_line(
+def test_what_is_not_of_floating_bases_is_refused_in_a_line(
     work: Path,
     words: tuple[str, ...],
     expected: int,

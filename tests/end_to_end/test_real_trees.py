@@ -126,9 +126,9 @@ def test_base_parameters_are_as_many_as_pinocchios_rank(tree) -> None:
 def test_mujoco_says_the_same(tree) -> None:
     name, robot, model = tree
     try:
-        following = robot.following
-        free = following.positions(robot.q), following.rates(robot.qd), following.rates(robot.qdd)
-        expected = following.summed(mujoco_torques(robot.loaded, *free))
+        mimic_map = robot.mimic_map
+        free = mimic_map.positions(robot.q), mimic_map.rates(robot.qd), mimic_map.rates(robot.qdd)
+        expected = mimic_map.summed(mujoco_torques(robot.loaded, *free))
     except NotCompared as reason:
         pytest.skip(str(reason))
     found = model.inverse_dynamics(robot.q, robot.qd, robot.qdd)

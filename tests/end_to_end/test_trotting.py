@@ -179,7 +179,7 @@ def test_the_command_says_how_it_went(
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
-        ("include/robot/robot.h", "robot_NQ 19", "robot_NQ 26", "not of a quadruped on a free root"),
+        ("include/robot/robot.h", "robot_NQ 19", "robot_NQ 26", "not of a quadruped on a floating base"),
         ("src/tables.c", "LF_FOOT", "RH_FOOT", "not feet named LF, RF, LH, RH, in this order"),
     ],
 )

@@ -62,7 +62,7 @@ def state(name: str, function: str = "forward_dynamics") -> list[Array]:
 
 
 def of_entries(name: str, q: Array, along_tangent: Array) -> Array:
-    """(..., nq) derivatives by the entries of q, from Pinocchio's (..., nv) along the tangent: with a free root
+    """(..., nq) derivatives by the entries of q, from Pinocchio's (..., nv) along the tangent: with a floating base
     d tangent / dq is [R^T, 0; 0, 2 (vector part of conj(quaternion) times dq)], zero along the quaternion."""
     if name not in ("hopper", "hyq"):
         return along_tangent

@@ -37,7 +37,7 @@ from psdmc.program.signature import TAU, Sizes
 from psdmc.recipes.directions import COTANGENT
 from psdmc.recipes.on_arrays import RobotOnArrays
 from psdmc.recipes.torques_and_accelerations import with_friction
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.load import load_robot
 from psdmc.robot.reference import Reference, reference
 from psdmc.toolchain.build_package import build_package
@@ -190,7 +190,7 @@ def resisted(plain: Reference, law: Callable[..., Array]) -> Reference:
 
 def on_coordinates(free: Reference, model: DynamicsModel) -> Reference:
     """Pinocchio's dynamics of a robot whose mimic joints follow: S^T tau with the rates S qd of all joints."""
-    own = Following.of(model.mechanism.coordinates, model.mechanism.types)
+    own = MimicMap.of(model.mechanism.coordinates, model.mechanism.types)
 
     class Followed(Reference):
         __slots__ = ()

@@ -80,7 +80,7 @@ class LoopTree:
             "tau": tau,
             "qdd": rng.normal(size=qd.shape),
             "dt": np.linspace(0.001, 0.02, COUNT),
-            "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_free_root,
+            "active": np.arange(COUNT)[:, None] % 2.0 * robot.has_floating_base,
             "mu": np.zeros(COUNT),
             "kp": rng.uniform(0.0, 50.0, COUNT),
             "kd": rng.uniform(0.0, 10.0, COUNT),

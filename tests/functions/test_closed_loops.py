@@ -450,7 +450,7 @@ def test_a_urdf_is_not_written_without_its_parallelogram(tmp_path: Path) -> None
     path.write_text(FOUR_BAR.replace(str(GROUND), str(LENGTHS["coupler"])), encoding="utf-8")
     loop = PIN | {"first": {"link": "rocker", "xyz": [LENGTHS["crank"], 0.0, 0.0]}}
     model = psdmc.derive(path, loops=[loop], expand=False)
-    assert model.mechanism.has_followers
+    assert model.mechanism.has_mimic_joints
     assert not model.mechanism.has_sums
     with pytest.raises(InputError, match="joint 'coupler_pin' follows another by a closed loop"):
         psdmc.export_urdf(model, tmp_path / "written.urdf")

@@ -29,13 +29,13 @@ from psdmc.recipes.torques_and_accelerations import torques
 from psdmc.robot.coordinates import Coordinate
 
 FUNCTIONS = [name for name, recipe in RECIPES.items() if not recipe.packs]
-ROBOTS = ("two_link", "scara", "followers", *SMALL)
+ROBOTS = ("two_link", "scara", "mimic joints", *SMALL)
 
 
 def model_of(name: str) -> DynamicsModel:
     if name in SMALL:
         return wide_robot(name).model
-    if name == "followers":  # of a turn a slide, of a slide a turn
+    if name == "mimic joints":  # of a turn a slide, of a slide a turn
         chain = random_chain(3, "RPPR")
         own = (Coordinate(0), Coordinate(0, 0.3, 0.1), Coordinate(2), Coordinate(2, -0.7, 0.2))
         return derive_model(replace(chain, coordinates=own))
@@ -49,7 +49,7 @@ def check(recipe: Recipe, robot: str, choices: Choices = PLAIN) -> None:
     check_dimensions(recipe, search.geometry.reframed(feet[0]), search.robot, choices)
 
 
-@pytest.mark.parametrize("robot", slow_but_for(["scara", "followers", "small"], list(ROBOTS)))
+@pytest.mark.parametrize("robot", slow_but_for(["scara", "mimic joints", "small"], list(ROBOTS)))
 def test_every_function_adds_like_quantities_only(robot):
     for name in FUNCTIONS:
         if RECIPES[name].lack_of_loops(model_of(robot).mechanism) is None:

@@ -97,15 +97,15 @@ def test_random_chains_have_pinocchios(seed: int) -> None:
 def test_joints_that_follow_others_count_with_their_leaders(tmp_path: Path) -> None:
     """Pinocchio's mass matrix and Jacobians of every joint, summed along what moves together."""
     path = tmp_path / "hand.urdf"
-    followers = [Coordinate(0), Coordinate(1), Coordinate(1, -1.5, 0.2), Coordinate(3)]
-    path.write_text(as_urdf(RandomTree(2, TREES["a wrist with two fingers"], "RRRP"), followers))
+    coordinates = [Coordinate(0), Coordinate(1), Coordinate(1, -1.5, 0.2), Coordinate(3)]
+    path.write_text(as_urdf(RandomTree(2, TREES["a wrist with two fingers"], "RRRP"), coordinates))
     robot = load_robot(path)
     model = derive_model(robot.mechanism, expand=False)
     q, mu = states(model)
     oracle = OnCoordinates.of(reference(robot), robot.mechanism)
     mass = oracle.mass_matrix(q)
-    given = {"q": oracle.following.positions(q)}
-    jacobians = oracle.following.summed(RECIPES["frame_jacobian"].pinocchio(oracle.free, given)["J"])
+    given = {"q": oracle.mimic_map.positions(q)}
+    jacobians = oracle.mimic_map.summed(RECIPES["frame_jacobian"].pinocchio(oracle.free, given)["J"])
     seen = jacobians @ np.linalg.solve(mass[:, None], np.swapaxes(jacobians, -1, -2))
     assert_near(
         compiled(model).operational_space_inertia(q, mu),

@@ -28,7 +28,7 @@ COUNT = 40
 
 TREE = TREES["a trunk with two arms"]
 KINDS = {"free": "FRSRLP", "standing": "RSTLRF", "spherical": "SRRSRR", "planar": "LRPLRR"}
-"""Types of the joints of trees of six bodies: on a free root, and with wide joints inside, at ends and in a row."""
+"""Types of the joints of trees of six bodies: on a floating base, and with wide joints inside, at ends and in a row."""
 
 SMALL = {
     "small": (TREES["a wrist with two fingers"], "FRSL"),

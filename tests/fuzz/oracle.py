@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 STATES = 3
 SEED = 6
 ROOT = 7, 6
-"""Coordinates and rates of a free root."""
+"""Coordinates and rates of a floating base."""
 
 
 def torque_error(
@@ -89,7 +89,7 @@ def _as_told(reference: Any, names: tuple[str, ...], options: LoadOptions) -> An
 
 class _Joints:
     """What every joint of Pinocchio's model does at a state of the robot's coordinates: those of its joints that follow no
-    other, in order, behind a free root's. Joints beside the robot rest, at neutral or where they are locked."""
+    other, in order, behind a floating base's. Joints beside the robot rest, at neutral or where they are locked."""
 
     def __init__(
         self, reference: Any, names: tuple[str, ...], follows: Mapping[str, tuple[str, float, float]],

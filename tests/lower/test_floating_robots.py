@@ -1,4 +1,4 @@
-"""Robots with a free root, and branched ones on a fixed base: lowered, and run against Pinocchio."""
+"""Robots with a floating base, and branched ones on a fixed base: lowered, and run against Pinocchio."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def test_a_serial_arm_keeps_its_factors() -> None:
     assert not search.best(RECIPES["forward_dynamics"], SINGLE, start).choices.articulated
 
 
-def test_e_and_p_of_a_free_root_are_refused() -> None:
+def test_e_and_p_of_a_floating_base_are_refused() -> None:
     robot = robot_at_hand("solo12", True)
     with pytest.raises(
         DerivationError, match="joint 'root_joint' moves freely: E and P are of joints of one"
@@ -239,7 +239,7 @@ def test_lowered_trees_with_joints_of_every_type_are_pinocchios(parents, kinds: 
 
 @pytest.mark.parametrize(("kinds", "massless"), [("FRR", 2), ("FRR", 1), ("RSR", 2), ("RRS", 2)])
 def test_the_joint_that_moves_no_inertia_is_named(kinds: str, massless: int) -> None:
-    """By its name, although its rate's number is another joint's, or none's: a free root has six, a ball joint three."""
+    """By its name, although its rate's number is another joint's, or none's: a floating base has six, a ball joint three."""
     robot = RandomTree(34, TREES["a fork"], kinds).mechanism()
     own = slice(PARAMETERS_PER_LINK * massless, PARAMETERS_PER_LINK * (massless + 1))
     parameters = robot.parameters.copy()

@@ -17,7 +17,7 @@ from slow_cases import slow_but_for
 from whole_robots import ROBOTS, WHOLE, derived, lowered
 
 from psdmc.derivation.derive import derive_model
-from psdmc.dynamics.frames import BASE, Follows
+from psdmc.dynamics.frames import BASE, Mimic
 from psdmc.functions import RECIPES
 from psdmc.lower.factored import Arrangement, trace_dynamics
 from psdmc.lower.kernels import lower
@@ -262,16 +262,16 @@ def test_limbs_whose_joints_follow_beyond_them_are_none() -> None:
     )
     assert possible_groups(frames)
     one = frames.copy()
-    one[5] = replace(one[5], follows=Follows(((4, 1.0),), 0.0))
+    one[5] = replace(one[5], mimic=Mimic(((4, 1.0),), 0.0))
     assert possible_groups(one) == ()
     across = frames.copy()
     across[2], across[5] = (
-        replace(frames[i], follows=Follows(((leader, 1.0),), 0.0)) for i, leader in ((2, 4), (5, 1))
+        replace(frames[i], mimic=Mimic(((leader, 1.0),), 0.0)) for i, leader in ((2, 4), (5, 1))
     )
     assert possible_groups(across) == ()
     unlike = frames.copy()
     unlike[2], unlike[5] = (
-        replace(frames[i], follows=Follows(((leader, 1.0),), 0.0)) for i, leader in ((2, 0), (5, 4))
+        replace(frames[i], mimic=Mimic(((leader, 1.0),), 0.0)) for i, leader in ((2, 0), (5, 4))
     )
     assert possible_groups(unlike) == ()
     assert frames[0].parent == BASE

@@ -1,4 +1,4 @@
-"""Whole robots of others, on a free root or branched, with functions lowered once for all tests."""
+"""Whole robots of others, on a floating base or branched, with functions lowered once for all tests."""
 
 from __future__ import annotations
 

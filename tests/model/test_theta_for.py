@@ -43,7 +43,7 @@ BEAST = urdf(
     joint("lift", "hull", "boom", kind="prismatic", rpy="0 0.4 0"),
     name="beast",
 )
-"""Its root link carries another by a fixed joint: on a free root the two are one body."""
+"""Its root link carries another by a fixed joint: on a floating base the two are one body."""
 
 
 def mimicking() -> str:
@@ -90,7 +90,7 @@ def with_bodies(name: str, given: Bodies):
         frame = theirs.frames[theirs.getFrameId(link_name, pin.BODY)]
         theirs.inertias[frame.parentJoint] = frame.placement.act(pin.Inertia(mass, com, inertia))
     mechanism = robot(name).mechanism
-    return OnCoordinates.of(oracle, mechanism) if mechanism.has_followers else oracle
+    return OnCoordinates.of(oracle, mechanism) if mechanism.has_mimic_joints else oracle
 
 
 def assert_near(found: np.ndarray, expected: np.ndarray, limit: float = EXACT) -> None:

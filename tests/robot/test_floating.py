@@ -185,7 +185,7 @@ def test_the_root_link_can_be_a_frame() -> None:
         ({"lock": {"root_joint": 0.0}}, "joint 'root_joint', to be locked, does not exist"),
     ],
 )
-def test_what_makes_no_sense_with_a_free_root_is_refused(options: dict[str, object], said: str) -> None:
+def test_what_makes_no_sense_with_a_floating_base_is_refused(options: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         floating(**options)
 

@@ -10,7 +10,7 @@ import pinocchio
 import pytest
 
 import psdmc
-from psdmc.robot.coordinates import Following
+from psdmc.robot.coordinates import MimicMap
 from psdmc.robot.load import load_robot, load_robot_text
 
 HERE = Path(__file__).parents[2] / "examples" / "palletiser"
@@ -50,9 +50,9 @@ def test_loops_of_the_palletiser_are_closed_in_pinocchio_in_random_positions():
     assert robot.v_names == ("axis_1", "axis_2", "axis_4", "axis_3")
     model = pinocchio.buildModelFromUrdf(str(PALLETISER))
     data = model.createData()
-    following = Following.of(robot.coordinates, robot.types)
+    mimic_map = MimicMap.of(robot.coordinates, robot.types)
     for q in np.random.default_rng(1).uniform(-3.0, 3.0, (20, 4)):
-        own = dict(zip(robot.joint_names, following.positions(q), strict=True))
+        own = dict(zip(robot.joint_names, mimic_map.positions(q), strict=True))
         pinocchio.framesForwardKinematics(model, data, configured(model, own))
         place = {name: data.oMf[model.getFrameId(name)] for end in ENDS for name in (end[0], end[2])}
         for first, one, second, other in ENDS:
@@ -78,17 +78,17 @@ def configured(model: pinocchio.Model, own: dict[str, float]) -> np.ndarray:
 def test_base_parameters_of_the_palletiser_are_as_many_as_the_rank_of_pinocchio_s_regressor():
     model = psdmc.derive(PALLETISER, loops=LOOPS)
     robot, tree = model.mechanism, pinocchio.buildModelFromUrdf(str(PALLETISER))
-    data, following = tree.createData(), Following.of(model.mechanism.coordinates, model.mechanism.types)
+    data, mimic_map = tree.createData(), MimicMap.of(model.mechanism.coordinates, model.mechanism.types)
     order = [tree.joints[tree.getJointId(name)].idx_v for name in robot.joint_names]
     rows = []
     rng = np.random.default_rng(2)
     for _ in range(60):
         q, qd, qdd = rng.uniform(-2.0, 2.0, (3, 4))
-        own = dict(zip(robot.joint_names, following.positions(q), strict=True))
+        own = dict(zip(robot.joint_names, mimic_map.positions(q), strict=True))
         rates = np.zeros((2, tree.nv))
-        rates[:, order] = following.rates(np.stack([qd, qdd]))
+        rates[:, order] = mimic_map.rates(np.stack([qd, qdd]))
         found = pinocchio.computeJointTorqueRegressor(tree, data, configured(tree, own), *rates)
-        rows.append(following.ratios.T @ found[order])
+        rows.append(mimic_map.ratios.T @ found[order])
     sizes = np.linalg.svd(np.concatenate(rows), compute_uv=False)
     rank = int(np.count_nonzero(sizes > 1e-9 * sizes[0]))
     assert sizes[rank - 1] > 1e6 * sizes[rank]  # a clear gap
@@ -100,7 +100,7 @@ def test_the_coupled_model_moves_as_the_tree_with_loops_that_stay():
     coupled = psdmc.derive(PALLETISER, loops=LOOPS)
     tree = psdmc.derive(PALLETISER, loops=tables)
     assert list(tree.loops) == ["drive", "level_lower", "level_upper"]
-    following = Following.of(coupled.mechanism.coordinates, coupled.mechanism.types)
+    mimic_map = MimicMap.of(coupled.mechanism.coordinates, coupled.mechanism.types)
     assert coupled.joint_names == tree.joint_names
     rng, motors = np.random.default_rng(3), list(coupled.mechanism.own_joints)
     for _ in range(5):
@@ -109,10 +109,10 @@ def test_the_coupled_model_moves_as_the_tree_with_loops_that_stay():
         whole[motors] = 1e3 * tau
         contacts = np.zeros(len(tree.contacts))
         qdd, _ = tree.constrained_forward_dynamics(
-            following.positions(q), following.rates(qd), whole, contacts
+            mimic_map.positions(q), mimic_map.rates(qd), whole, contacts
         )
         expected = coupled.forward_dynamics(q, qd, 1e3 * tau)
-        np.testing.assert_allclose(qdd, following.rates(expected), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(qdd, mimic_map.rates(expected), rtol=1e-9, atol=1e-9)
 
 
 def loop_tables() -> list[dict[str, object]]:
@@ -149,7 +149,7 @@ CROSSED = 2.0 * np.angle(0.5 - TIP)
 def test_other_linkages_stay_loops(lengths, angles):
     robot = loaded(lengths, angles)
     assert [loop.name for loop in robot.loops] == ["pin"]
-    assert not robot.has_followers
+    assert not robot.has_mimic_joints
 
 
 def test_follows_names_the_joints_without_motors_or_keeps_the_loop():
@@ -163,9 +163,9 @@ def test_follows_names_the_joints_without_motors_or_keeps_the_loop():
 def test_joints_that_cannot_follow_are_an_error():
     with pytest.raises(psdmc.InputError, match="loop 'pin': joints cannot follow linearly"):
         loaded((0.2, 0.5, 0.4, 0.45), (0.5, 0.0, 1.2), more='follows = ["coupler"]')
-    with pytest.raises(psdmc.InputError, match="joint 'crank' cannot follow: found followers"):
+    with pytest.raises(psdmc.InputError, match="joint 'crank' cannot follow others: found"):
         loaded((0.2, 0.5, 0.2, 0.5), more='follows = ["crank", "coupler", "rocker"]')
-    with pytest.raises(psdmc.InputError, match="joint 'crank' cannot follow: found followers"):
+    with pytest.raises(psdmc.InputError, match="joint 'crank' cannot follow others: found"):
         loaded((0.2, 0.5, 0.2, 0.5), more='passive = ["crank", "coupler", "rocker"]')
 
 

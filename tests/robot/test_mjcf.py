@@ -193,7 +193,7 @@ def test_random_trees_have_mujocos_torques(seed: int, tmp_path: Path) -> None:
     standing(written(tmp_path, random_mjcf(seed)))
 
 
-def test_a_free_root_floats_without_being_asked(tmp_path: Path) -> None:
+def test_a_floating_base_floats_without_being_asked(tmp_path: Path) -> None:
     path = written(tmp_path, FLYING)
     robot, model = derive(path, snap=0.0), of_file(path)
     assert robot.joint_names == ("root_joint", "hip_l", "hip_r")
@@ -301,7 +301,7 @@ def test_constraints_are_refused_by_name(more: str, message: str, tmp_path: Path
 
 
 def balls_agree(path: Path) -> DynamicsModel:
-    """psdmc's torques are those of MuJoCo's own model of the file, its quaternions w x y z; a free root comes first."""
+    """psdmc's torques are those of MuJoCo's own model of the file, its quaternions w x y z; a floating base comes first."""
     robot, model = derive(path, snap=0.0), of_file(path)
     given = states(20, robot.nq, robot.nv)
     q, qd, qdd = on_joints(robot.mechanism, given[0]), *given[1:]

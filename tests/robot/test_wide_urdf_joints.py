@@ -50,7 +50,7 @@ def test_torques_are_pinocchios(snap: float) -> None:
     assert_is(robot, pin.buildModelFromXML(urdf(*RAFT)))
 
 
-def test_they_stand_on_a_free_root_too() -> None:
+def test_they_stand_on_a_floating_base_too() -> None:
     oracle = pin.buildModelFromXML(urdf(*RAFT), pin.JointModelFreeFlyer())
     assert_is(read(urdf(*RAFT), floating=True), oracle)
 

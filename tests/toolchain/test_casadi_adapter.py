@@ -234,7 +234,7 @@ ON_FLOATING = [
 
 @cache
 def free_tree() -> RandomTree:
-    """A free root with a hinge."""
+    """A floating base with a hinge."""
     return RandomTree(5, (-1, 0), "FR")
 
 

@@ -37,7 +37,7 @@ Array = np.ndarray
 
 @pytest.fixture(scope="module")
 def floating(tmp_path_factory: pytest.TempPathFactory) -> External:
-    """A free root with a hinge."""
+    """A floating base with a hinge."""
     names = [*TWICE, "mass_matrix", "inverse_dynamics_with_wrenches"]
     folder = tmp_path_factory.mktemp("casadi") / "floating"
     return external("floating", folder, names, free_model(), adapter="casadi_hessian")

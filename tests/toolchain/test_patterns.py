@@ -22,7 +22,7 @@ from psdmc.toolchain.call import CompiledRobot
 
 FUNCTIONS = ["mass_matrix", "regressor", "jacobian", "gravity"]
 PARENTS = (-1, 0, 1, 0)
-"""A free root with two branches, of two joints and one."""
+"""A floating base with two branches, of two joints and one."""
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +43,8 @@ def dense(shape: tuple[int, int], places: tuple[np.ndarray, np.ndarray]) -> np.n
 
 
 def related(model: DynamicsModel) -> np.ndarray:
-    """(nv, nv) whether a mass matrix has an entry: where one joint carries the other. The free root's own block is m 1 and
-    m [c]x, with zeros of its own."""
+    """(nv, nv) whether a mass matrix has an entry: where one joint carries the other. The floating base's own block is m 1
+    and m [c]x, with zeros of its own."""
     robot = model.mechanism
     paths = [set(robot.path_to(joint)) for joint in robot.rate_joints]
     found = np.array([[own <= other or other <= own for other in paths] for own in paths])

@@ -48,7 +48,7 @@ def short_search() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def tree() -> RandomTree:
-    """A free root with a planar joint, a spherical one behind a revolute one, and a translating one."""
+    """A floating base with a planar joint, a spherical one behind a revolute one, and a translating one."""
     return RandomTree(51, (-1, 0, 1, 0, 3), "FRSLT")
 
 

@@ -27,7 +27,9 @@ def error_of(found: dict[str, float], expected: dict[str, float]) -> float:
         beside=None,
         packs=None,
     )
-    errors, _ = _errors(recipe, None, SimpleNamespace(follows=False, free=None), {}, np.zeros(0), 1e-9)
+    errors, _ = _errors(
+        recipe, None, SimpleNamespace(has_mimic_joints=False, free=None), {}, np.zeros(0), 1e-9
+    )
     return max(errors.values())
 
 

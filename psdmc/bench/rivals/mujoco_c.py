@@ -20,7 +20,7 @@ from psdmc.robot.mechanism import BASE, DRIVE, FREE_RATES, Array, Mechanism
 RIVAL = "MuJoCo"
 FUNCTIONS = ("inverse_dynamics", "nonlinear_effects")
 
-OTHER_BIAS = "a free root's rates are along the world's axes there, which makes its bias another"
+OTHER_BIAS = "a floating base's rates are along the world's axes there, which makes its bias another"
 
 
 def contestants(case: Case, flags: tuple[str, ...]) -> list[Contestant | Unavailable]:

@@ -164,7 +164,7 @@ def clearance_of(model: DynamicsModel, folders: Sequence[Path] = (), floor: floa
     chain, source = model.mechanism, str(model.provenance.get("source_name", "robot"))
     if model.provenance.get("source_format") != "urdf":
         raise InputError(f"{source} has no collision shapes", "derive the model from a URDF")
-    if chain.has_followers:
+    if chain.has_mimic_joints:
         raise InputError(f"{source} has joints that follow others", "lock them: --lock JOINT=0")
     if not hasattr(pin, "computeCollisions"):
         raise InputError("Pinocchio was built without coal", "install the wheel pin, which has it")

@@ -48,7 +48,7 @@ class Free(WideJoint):
     def rotation(self, q: Sequence[Scalar]) -> Rows:
         return rotation_of(q[3:])
 
-    def way(self, q: Sequence[Scalar]) -> Vector:
+    def displacement(self, q: Sequence[Scalar]) -> Vector:
         return (q[0], q[1], q[2])
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -66,7 +66,7 @@ class Free(WideJoint):
         gone = [v + (first * a + second * b) for v, a, b in zip(linear, across, twice, strict=True)]
         moved = _inward(rotation_of(here), gone)
         nearer = sign(cosine)  # of the two quaternions for one turn that to the one before, as Pinocchio's
-        return (*(p + way for p, way in zip(q[:3], moved, strict=True)), *(nearer * x for x in turned))
+        return (*(p + d for p, d in zip(q[:3], moved, strict=True)), *(nearer * x for x in turned))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return the constant rates, velocity v and angular velocity w, that lead from q to `other` in one second.
@@ -87,10 +87,10 @@ class Free(WideJoint):
         return (*_inward(rotation_of(q[3:]), rates[:3]), *rates_of(q[3:], rates[3:]))
 
     def rates_bent(
-        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], motion: Sequence[Scalar]
     ) -> tuple[Scalar, ...]:
-        turned = _inward(rotation_of(q[3:]), _cross(way[3:], rates[:3]))
-        return (*turned, *rates_bent(q[3:], rates[3:], way[3:]))
+        turned = _inward(rotation_of(q[3:]), _cross(motion[3:], rates[:3]))
+        return (*turned, *rates_bent(q[3:], rates[3:], motion[3:]))
 
     def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
         back = rotation_of(inverse(unit(q[3:])))

@@ -40,8 +40,8 @@ Rows = tuple[Vector, Vector, Vector]
 
 class JointType:
     """One type of joint. If `about_z` is true, it turns about z, slides along z, or does both in a fixed ratio, by one
-    coordinate. Else it has several coordinates, and the functions `rotation` and `way` give the placement of the moved
-    frame. Rates are along the axes of the moved frame.
+    coordinate. Else it has several coordinates, and the functions `rotation` and `displacement` give the placement of the
+    moved frame. Rates are along the axes of the moved frame.
 
     word           name in robot files, model files and tables
     urdf_words     types of a URDF's <joint> that move like this; the last one is for joints without position limits
@@ -110,7 +110,7 @@ class JointType:
         position. Return None if the joint never turns, or turns about z (see `turn`)."""
         return None
 
-    def way(self, q: Sequence[Scalar]) -> Vector | None:
+    def displacement(self, q: Sequence[Scalar]) -> Vector | None:
         """Return the displacement of the joint frame's origin at nq coordinates, in m, relative to the neutral
         position. Return None if the origin stays, or moves along z (see `slide`)."""
         return None
@@ -120,15 +120,15 @@ class JointType:
         is a number, or nq numbers."""
         values = [float(x) for x in np.atleast_1d(q)]
         if not self.about_z:
-            rows, moved = self.rotation(values), self.way(values)
+            rows, moved = self.rotation(values), self.displacement(values)
             return Placement(
                 np.eye(3) if rows is None else np.array(rows),
                 np.zeros(3) if moved is None else np.array(moved),
             )
-        angle, way = self.turn(values[0]), self.slide(values[0])
+        angle, height = self.turn(values[0]), self.slide(values[0])
         c, s = (1.0, 0.0) if angle is None else (cosine(angle), sine(angle))
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return Placement(rotation, np.array([0.0, 0.0, 0.0 if way is None else way]))
+        return Placement(rotation, np.array([0.0, 0.0, 0.0 if height is None else height]))
 
     def restored(self, q: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return the valid coordinates nearest to q: quaternions, and pairs of cosine and sine, get length one."""
@@ -142,7 +142,7 @@ class JointType:
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return the nq coordinates after a motion of one second at the nv constant rates `step`. Quaternions in the
         result have length one."""
-        return tuple(here + way for here, way in zip(q, step, strict=True))
+        return tuple(here + change for here, change in zip(q, step, strict=True))
 
     def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> tuple[Scalar, ...]:
         """Return the nv constant rates from q to `other` in one second, with a rotation of at most half a turn."""
@@ -153,10 +153,10 @@ class JointType:
         return tuple(rates)
 
     def rates_bent(
-        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], motion: Sequence[Scalar]
     ) -> tuple[Scalar, ...]:
         """Return how fast the result of `coordinate_rates`, at constant `rates`, changes while q moves at the nv joint
-        rates `way`. These are second derivatives of the coordinates."""
+        rates `motion`. These are second derivatives of the coordinates."""
         return (0.0,) * self.nq
 
     def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:

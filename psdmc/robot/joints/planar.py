@@ -43,7 +43,7 @@ class Planar(WideJoint):
         c, s = q[2], q[3]
         return ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
 
-    def way(self, q: Sequence[Scalar]) -> Vector:
+    def displacement(self, q: Sequence[Scalar]) -> Vector:
         return (q[0], q[1], 0.0)
 
     def integrated(self, q: Sequence[Scalar], step: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -79,9 +79,9 @@ class Planar(WideJoint):
         return (c * vx - s * vy, s * vx + c * vy, -(s * w), c * w)
 
     def rates_bent(
-        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], motion: Sequence[Scalar]
     ) -> tuple[Scalar, ...]:
-        (_, _, c, s), (vx, vy, w), turn = q, rates, way[2]
+        (_, _, c, s), (vx, vy, w), turn = q, rates, motion[2]
         turned = -(turn * w)
         return (-turn * (s * vx + c * vy), turn * (c * vx - s * vy), turned * c, turned * s)
 

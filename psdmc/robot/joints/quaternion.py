@@ -83,10 +83,12 @@ def rates_of(quaternion: Sequence[Scalar], angular: Sequence[Scalar]) -> Quatern
     return product(quaternion, (x, y, z, 0.0))
 
 
-def rates_bent(quaternion: Sequence[Scalar], angular: Sequence[Scalar], way: Sequence[Scalar]) -> Quaternion:
+def rates_bent(
+    quaternion: Sequence[Scalar], angular: Sequence[Scalar], motion: Sequence[Scalar]
+) -> Quaternion:
     """Return how fast the result of `rates_of`, at constant angular velocity `angular`, changes while the quaternion
-    turns at the angular velocity `way`."""
-    return rates_of(rates_of(quaternion, way), angular)
+    turns at the angular velocity `motion`."""
+    return rates_of(rates_of(quaternion, motion), angular)
 
 
 def turning(quaternion: Sequence[Scalar], moved: Sequence[Scalar]) -> Vector:

@@ -58,9 +58,9 @@ class Spherical(WideJoint):
         return rates_of(q, rates)
 
     def rates_bent(
-        self, q: Sequence[Scalar], rates: Sequence[Scalar], way: Sequence[Scalar]
+        self, q: Sequence[Scalar], rates: Sequence[Scalar], motion: Sequence[Scalar]
     ) -> tuple[Scalar, ...]:
-        return rates_bent(q, rates, way)
+        return rates_bent(q, rates, motion)
 
     def tangent(self, q: Sequence[Scalar], moved: Sequence[Scalar]) -> tuple[Scalar, ...]:
         return turning(q, moved)

@@ -26,7 +26,7 @@ class Translation(WideJoint):
     pinocchio: ClassVar[str] = "Translation"
     mujoco: ClassVar[str] = "none"
 
-    def way(self, q: Sequence[Scalar]) -> Vector:
+    def displacement(self, q: Sequence[Scalar]) -> Vector:
         return (q[0], q[1], q[2])
 
 

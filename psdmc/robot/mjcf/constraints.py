@@ -26,7 +26,7 @@ REMEDY = "take them out of the file: psdmc models trees of rigid bodies"
 
 
 @dataclass(frozen=True, slots=True)
-class Follows:
+class Mimic:
     """Describes a mimic joint of an MJCF file: its position q is ratio times that of `leader`, plus offset."""
 
     leader: str
@@ -38,7 +38,7 @@ def refuse_constraints(mujoco: Any, model: Any, names: Names, source: str) -> No
     """Raise InputError with the names of all constraints and joints that psdmc cannot model."""
     faults = [
         *_other_equalities(mujoco, model),
-        *_followed_twice(mujoco, model, names),
+        *_mimicked_twice(mujoco, model, names),
         *_tendons(mujoco, model),
         *_wide_drives(mujoco, model, names),
     ]
@@ -107,7 +107,7 @@ def _is_linear(mujoco: Any, model: Any, k: int) -> bool:
     return bool(both) and not model.eq_data[k, 2:5].any()
 
 
-def _followed_twice(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
+def _mimicked_twice(mujoco: Any, model: Any, names: Names) -> Iterator[str]:
     own = [
         int(model.eq_obj1id[k])
         for k in range(model.neq)
@@ -140,7 +140,7 @@ def of_balls(mujoco: Any, model: Any) -> list[int]:
     return [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_BALL]
 
 
-def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
+def mimic_joints(mujoco: Any, model: Any, names: Names) -> dict[str, Mimic]:
     """Return the joints that follow another joint by an equality constraint q1 - ref1 = c0 + c1 (q2 - ref2). Here ref1
     and ref2 are the reference positions of the joints."""
     found = {}
@@ -150,7 +150,7 @@ def followers(mujoco: Any, model: Any, names: Names) -> dict[str, Follows]:
         own, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         shift, ratio = model.eq_data[k, :2].tolist()
         ref, leaders = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (own, leader))
-        found[names.joint(own)] = Follows(names.joint(leader), ratio, ref + shift - ratio * leaders)
+        found[names.joint(own)] = Mimic(names.joint(leader), ratio, ref + shift - ratio * leaders)
     return found
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.robot.limits import listed, shown
 from psdmc.robot.mjcf.constraints import (
-    followers,
+    mimic_joints,
     mjcf_loops,
     of_balls,
     refuse_armatures,
@@ -91,14 +91,14 @@ def read_mjcf(path: Path, source: str, root: str | None = None) -> MjcfRobot:
             model, warned = _compiled(mujoco, path, source, others)
             warned = [*warned, f"left out by --root {root}: {listed([names.body(b) for b in others])}"]
             names = Names.of(mujoco, model)
-    free = _free_root(mujoco, model, names, source)
+    free = _floating_joint(mujoco, model, names, source)
     refuse_constraints(mujoco, model, names, source)
     refuse_references(mujoco, model, names, source)
     refuse_armatures(mujoco, model, names, source)
     notes = [f"MJCF, as MuJoCo {mujoco.__version__} compiles it", *left_out(mujoco, model, names), *warned]
-    follows = followers(mujoco, model, names)
+    mimics = mimic_joints(mujoco, model, names)
     return MjcfRobot(
-        tree_text(mujoco, model, names, follows, free, notes),
+        tree_text(mujoco, model, names, mimics, free, notes),
         gravity(mujoco, model),
         free is not None,
         tuple(mjcf_loops(mujoco, model, names, free, source)),
@@ -177,7 +177,7 @@ def _with_massless(mujoco: Any, path: Path, left_out: Sequence[int]) -> Any:
         return model
 
 
-def _free_root(mujoco: Any, model: Any, names: Names, source: str) -> int | None:
+def _floating_joint(mujoco: Any, model: Any, names: Names, source: str) -> int | None:
     """The body on a free joint that all others move with; None where the robot stands."""
     free = [
         int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
@@ -234,9 +234,9 @@ def left_out(mujoco: Any, model: Any, names: Names) -> list[str]:
         ],
     }
     notes = [f"{what}: {listed(which)}" for what, which in found.items() if which]
-    followed = followers(mujoco, model, names)
-    if followed:
-        notes.append(f"equality constraints of joints hold exactly: {listed(list(followed))}")
+    coupled = mimic_joints(mujoco, model, names)
+    if coupled:
+        notes.append(f"equality constraints of joints hold exactly: {listed(list(coupled))}")
     if model.opt.density > 0.0 or model.opt.viscosity > 0.0:
         notes.append("forces of the medium (density, viscosity) are not modelled")
     return [*notes, *(["plugins are not modelled"] if model.nplugin else [])]

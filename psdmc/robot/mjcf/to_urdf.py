@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.limits import TINIEST, free_name
-from psdmc.robot.mjcf.constraints import Follows
+from psdmc.robot.mjcf.constraints import Mimic
 from psdmc.robot.mjcf.mujoco_model import Names, armatures
 from psdmc.robot.urdf.urdf_words import BALL, DRIVE, MJCF, NOTE
 
@@ -35,7 +35,7 @@ class _Writer:
     mujoco: Any
     model: Any
     names: Names
-    follows: Mapping[str, Follows]
+    mimics: Mapping[str, Mimic]
     root: Element
     armatures: Array
     links: set[str] = field(default_factory=set)
@@ -70,13 +70,13 @@ def tree_text(
     mujoco: Any,
     model: Any,
     names: Names,
-    follows: Mapping[str, Follows],
+    mimics: Mapping[str, Mimic],
     free: int | None,
     notes: Sequence[str],
 ) -> str:
     """Return the text of a URDF with the tree of a compiled MJCF.
 
-    follows  the mimic joints
+    mimics   the mimic joints
     free     the body that becomes the root link, on a free joint
     notes    sentences that the URDF carries for the command `show`
     """
@@ -89,7 +89,7 @@ def tree_text(
     for note in notes:
         SubElement(robot, NOTE, text=note)
     drives = armatures(mujoco, model)
-    writer = _Writer(mujoco, model, names, follows, robot, drives, set(names.bodies), set(names.joints))
+    writer = _Writer(mujoco, model, names, mimics, robot, drives, set(names.bodies), set(names.joints))
     root = 0 if free is None else free
     writer.link(names.body(root), root)
     for body in range(1, model.nbody):
@@ -166,8 +166,8 @@ def _moving(writer: _Writer, j: int, parent: str, child: str, place: tuple[Array
     if limits:
         SubElement(element, "limit", limits)
     _dynamics(writer, j, element)
-    if name in writer.follows:
-        rule = writer.follows[name]
+    if name in writer.mimics:
+        rule = writer.mimics[name]
         numbers = {"multiplier": _number(rule.ratio), "offset": _number(rule.offset)}
         SubElement(element, "mimic", {"joint": rule.leader, **numbers})
     if writer.armatures[j] > 0.0:

@@ -31,13 +31,13 @@ def pinocchio_model(
     source: str,
     movable: Collection[str] | None = None,
     kinds: Mapping[str, str] | None = None,
-    free_root: str | None = None,
+    root_joint: str | None = None,
 ) -> pinocchio.Model:
     """Return Pinocchio's model of a URDF that read_urdf has accepted. Its joints are called JOINT_PREFIX + name.
 
-    movable   names of joints; all others become fixed, and their bodies are merged (None: all joints stay)
-    kinds     joint types of the file -> types that replace them
-    free_root name of a free joint for the root link (None: the root link is fixed)
+    movable     names of joints; all others become fixed, and their bodies are merged (None: all joints stay)
+    kinds       joint types of the file -> types that replace them
+    root_joint  name of a free joint for the root link (None: the root link is fixed)
 
     A continuous joint becomes a revolute one, because Pinocchio would use a cosine and a sine as its coordinates.
     Raises InputError if Pinocchio rejects the text.
@@ -48,10 +48,10 @@ def pinocchio_model(
     )
     balls = () if kinds else [JOINT_PREFIX + name for name in ball_names(root)]
     try:
-        if free_root is None:
+        if root_joint is None:
             return _with_balls(pinocchio.buildModelFromXML(wanted), balls)
-        root_joint = pinocchio.JointModelFreeFlyer()
-        return _with_balls(pinocchio.buildModelFromXML(wanted, root_joint, JOINT_PREFIX + free_root), balls)
+        free_flyer = pinocchio.JointModelFreeFlyer()
+        return _with_balls(pinocchio.buildModelFromXML(wanted, free_flyer, JOINT_PREFIX + root_joint), balls)
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{source}: Pinocchio cannot read it: {reason}", "check_urdf may say more") from None

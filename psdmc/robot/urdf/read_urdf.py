@@ -100,7 +100,7 @@ class UrdfRobot:
     without <inertial>.
 
     notes      content of the file that psdmc ignores, one sentence each
-    free_root  the free joint that was added above the file's root link, if any
+    root_joint the free joint that was added above the file's root link, if any
     shapes     links with collision shapes only: they have neither inertia nor a visual
     """
 
@@ -109,7 +109,7 @@ class UrdfRobot:
     inertials: dict[str, UrdfInertial | None]
     joints: tuple[UrdfJoint, ...]
     notes: tuple[str, ...]
-    free_root: str | None = None
+    root_joint: str | None = None
     shapes: tuple[str, ...] = ()
 
     @property

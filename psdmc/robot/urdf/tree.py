@@ -120,7 +120,7 @@ def _last_joints(robot: UrdfRobot) -> list[UrdfJoint]:
 
 def _whole_note(robot: UrdfRobot, ends: Sequence[str], source: str) -> str:
     """Describe the tree, and the options for earlier releases' chain, unless its root is free."""
-    if robot.free_root is not None:
+    if robot.root_joint is not None:
         return f"the whole tree, to its ends {listed(ends)}"
     try:
         before = f", as --tip {shlex.quote(default_tip(robot, robot.root, source)[0])}"
@@ -206,10 +206,10 @@ def _fixed_end(robot: UrdfRobot, link: str) -> str:
 
 
 def _parting_link(robot: UrdfRobot, base: str, ends: Sequence[str]) -> str:
-    """The last link that the ways from base to all of the ends share."""
-    ways = [[joint.child for joint in joints_between(robot, base, end) or ()] for end in ends]
+    """The last link that the paths from base to all of the ends share."""
+    paths = [[joint.child for joint in joints_between(robot, base, end) or ()] for end in ends]
     shared = base
-    for links in zip(*ways, strict=False):
+    for links in zip(*paths, strict=False):
         if any(link != links[0] for link in links):
             break
         shared = links[0]
@@ -239,7 +239,7 @@ def _refuse_unsupported(robot: UrdfRobot, route: Route, source: str) -> None:
         if joint.type not in (*MOVABLE, "fixed") and (joint.name in on_chain or joint.type not in LOCKABLE)
     ]
     if problems:
-        can_cut = route.ends and robot.free_root is None
+        can_cut = route.ends and robot.root_joint is None
         cut = "; --tip LINK takes one chain of the tree" if can_cut else ""
         ball = f"; {BALL}" if any(joint.type in BALLS for joint in robot.joints) else ""
         hint = f"psdmc models {', '.join(MOVABLE)} and fixed joints{ball}{cut}"

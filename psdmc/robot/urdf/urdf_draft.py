@@ -51,7 +51,7 @@ def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
     read = read_urdf(text, source)
     robot = locked(read, options.lock, source)
     if options.floating:
-        robot = on_free_root(robot)
+        robot = on_floating_base(robot)
     route = find_route(robot, options.base, options.tip, source, frames)
     placed = _placed(route, snap)
     base_rotation, base_snaps = _base_rotation(route, snap)
@@ -99,7 +99,7 @@ def urdf_draft(text: str, source: str, options: LoadOptions) -> Draft:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Placed:
-    """Joints one in the other, the bodies that they hang on, the tip, and what was snapped on the way."""
+    """Joints one in the other, the bodies that they hang on, the tip, and what was snapped on the path."""
 
     joints: tuple[Joint, ...]
     parents: tuple[int, ...]
@@ -108,7 +108,7 @@ class _Placed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Way:
+class _Reached:
     """Where a link is: on which body, at which place in its joint frame, and what was snapped since that joint."""
 
     body: int
@@ -120,19 +120,19 @@ def _placed(route: Route, snap: float) -> _Placed:
     """Each turn is snapped as it is read, so that products of exact rotations stay exact; then once more what
     several merged ones came to.
 
-    A turn that several joints lie beyond was snapped on the way to each of them.
+    A turn that several joints lie beyond was snapped on the path to each of them.
     """
     reach = _reach(route)
-    ways = {route.base: _Way(ON_BASE, Placement.identity())}
+    reached = {route.base: _Reached(ON_BASE, Placement.identity())}
     joints: list[Joint] = []
     parents: list[int] = []
     snaps: list[Snap] = []
     for joint in route.path:
-        outer, n = ways[joint.parent], len(joints)
+        outer, n = reached[joint.parent], len(joints)
         turned = list(outer.snapped)
         at = outer.place @ _origin(joint, snap, turned, n)
         if not joint.is_movable:
-            ways[joint.child] = _Way(outer.body, at, tuple(turned))
+            reached[joint.child] = _Reached(outer.body, at, tuple(turned))
             continue
         axis, angle = snap_axis(np.array(joint.axis if _kind(joint).follows_axis else ALONG_Z), snap)
         _record(turned, f"axis of joint '{joint.name}'", angle, n)
@@ -142,8 +142,8 @@ def _placed(route: Route, snap: float) -> _Placed:
         joints.append(Joint(joint.name, joint.child, _kind(joint), placement, link, joint.limits))
         parents.append(outer.body)
         snaps += [replace(one, segment=n) for one in turned]
-        ways[joint.child] = _Way(n, link)
-    end, n = ways[route.tip], len(joints)
+        reached[joint.child] = _Reached(n, link)
+    end, n = reached[route.tip], len(joints)
     turned = list(end.snapped)
     tip = merged_placement(end.place, f"tip '{route.tip}', merged", snap, turned, n, reach)
     snaps += [replace(one, segment=n) for one in turned]
@@ -173,7 +173,7 @@ to 1e3 rad leaves 1e-13, another reading of a number far more."""
 
 
 def _reach(route: Route) -> float:
-    """The longest way from the base outward, m: every step as the file has it."""
+    """The longest path from the base outward, m: every step as the file has it."""
     far = {route.base: 0.0}
     for joint in route.path:
         far[joint.child] = far[joint.parent] + math.hypot(*joint.origin.xyz)
@@ -273,15 +273,15 @@ def hold_against_pinocchio(
     merged inertias are compared. `held` are the positions of joints that are locked at another position than the
     neutral one.
     """
-    free = robot.free_root
-    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), free_root=free)
+    free = robot.root_joint
+    alone = pinocchio_model(text, source, kinds=dict.fromkeys(LOCKABLE, REVOLUTE.word), root_joint=free)
     for joint in robot.joints:
         own = body_parameters(robot.inertials[joint.child], Placement.identity())
         _compare(
             own, alone.inertias[alone.getJointId(JOINT_PREFIX + joint.name)], joint.child, "the body", source
         )
     movable = [joint.name for joint in route.movable]
-    whole = locked_at(pinocchio_model(text, source, [*movable, *held], free_root=free), held)
+    whole = locked_at(pinocchio_model(text, source, [*movable, *held], root_joint=free), held)
     for joint, own in zip(route.movable, merged, strict=True):
         body = whole.inertias[whole.getJointId(JOINT_PREFIX + joint.name)]
         _compare(own, body, joint.child, "all that moves with it", source)
@@ -326,7 +326,7 @@ WORLD = "universe"
 """Pinocchio's name of what the free joint hangs on; more underscores follow where a link of the file is called so."""
 
 
-def on_free_root(robot: UrdfRobot) -> UrdfRobot:
+def on_floating_base(robot: UrdfRobot) -> UrdfRobot:
     """Return the robot with a free joint between the world frame and the frame of the root link."""
     name = free_name(ROOT_JOINT, {joint.name for joint in robot.joints})
     world = free_name(WORLD, set(robot.inertials))
@@ -346,7 +346,7 @@ def on_free_root(robot: UrdfRobot) -> UrdfRobot:
         root=world,
         inertials={world: None, **robot.inertials},
         joints=(free, *robot.joints),
-        free_root=name,
+        root_joint=name,
     )
 
 

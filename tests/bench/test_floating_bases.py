@@ -127,7 +127,7 @@ def test_ways_that_differentiate_by_coordinates_are_not_compared(bird: Case, two
 
 def test_a_robot_whose_joints_follow_others_is_refused_to_rivals_with_the_reason() -> None:
     chain = load_robot_text(PAIR, "urdf").mechanism
-    assert chain.has_followers
+    assert chain.has_mimic_joints
     with pytest.raises(InputError, match="follows another"):
         robot_as_numbers(chain)
 
