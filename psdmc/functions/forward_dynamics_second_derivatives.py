@@ -188,7 +188,7 @@ def _bent_rows(frames: Sequence[Frame], still: int, nv: int) -> Iterator[For]:
 def _coupled(frames: Sequence[Frame]) -> list[tuple[int, ...]]:
     """For each rate those that move a joint of it, carry one or are carried by one."""
     moved = [
-        {i for i, frame in enumerate(frames) if owner in (i, frame.mimic and frame.mimic[0])}
+        {i for i, frame in enumerate(frames) if i == owner or (frame.mimic and owner in frame.mimic.leaders)}
         for owner in joints_of_rates(frames)
     ]
     carriers = [set(with_carriers(frames, own)) for own in moved]

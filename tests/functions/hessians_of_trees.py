@@ -20,7 +20,7 @@ from psdmc.robot.coordinates import Coordinate
 
 Array = np.ndarray
 
-SHAPES = (*(TREES[name] for name in ("a fork", "a wrist with two fingers")), (-1, 0, 1))
+SHAPES = (*(TREES[name] for name in ("a fork", "a wrist with two fingers", "two on the base")), (-1, 0, 1))
 """Parents; in these trees psdmc and Pinocchio count joints alike."""
 
 
@@ -79,7 +79,7 @@ def trees(draw: st.DrawFn, letters: str = "RPFS") -> HessianTree:
 
 
 @st.composite
-def followers(draw: st.DrawFn) -> HessianTree:
+def with_mimic_joints(draw: st.DrawFn) -> HessianTree:
     """The last joint follows another one."""
     tree = draw(trees("RP")).tree
     leader = draw(st.integers(0, tree.n - 2))

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 from fifty_digits import fifty_digit_jacobian
-from hessians_of_trees import HessianTree, error, followers, trees
+from hessians_of_trees import HessianTree, error, trees, with_mimic_joints
 from hypothesis import given, settings
+from lowered import lowered
+from random_trees import RandomTree
 from wide_robots import is_pinocchios, wide_robot
 
 from psdmc.functions import RECIPES
 from psdmc.program.interpret import interpret
+from psdmc.robot.coordinates import Coordinate
 
 NAME = "forward_dynamics_second_derivatives"
 EXACT = 1e-10
@@ -53,9 +56,18 @@ def test_of_many_random_trees_it_is_casadis(own: HessianTree) -> None:
 
 
 @settings(max_examples=6)
-@given(followers())
+@given(with_mimic_joints())
 def test_of_trees_with_mimic_joints_it_is_casadis(own: HessianTree) -> None:
     is_casadis(own)
+
+
+def test_the_program_of_a_mimic_joint_on_another_branch_is_casadis() -> None:
+    """Joint 2 mimics joint 0. Joint 1 carries joint 2, but not joint 0."""
+    coordinates = (Coordinate(0), Coordinate(1), Coordinate(0, -1.5, 0.3))
+    own = HessianTree(RandomTree(5, (-1, -1, 1), "RRR"), coordinates)
+    program = lowered(own.model, functions=[NAME])[NAME].single
+    found = interpret(program, own.given, {"hessian": 36, "pivot": 2})["hessian"]
+    assert error(found.reshape(-1, 6, 6), own.expected("tau")) < EXACT
 
 
 def test_it_is_what_fifty_digit_differences_of_the_gradient_say() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from against_pinocchio import ARM, INTERPRETED, SEVERAL, bench, matches_pinocchio, program_matches_pinocchio
 from fifty_digits import fifty_digit_jacobian
-from hessians_of_trees import HessianTree, error, followers, trees
+from hessians_of_trees import HessianTree, error, trees, with_mimic_joints
 from hypothesis import given, settings
 from wide_robots import is_pinocchios
 
@@ -42,7 +42,7 @@ def test_of_random_trees_it_is_casadis(own: HessianTree) -> None:
 
 
 @settings(max_examples=6)
-@given(followers())
+@given(with_mimic_joints())
 def test_of_trees_with_mimic_joints_it_is_casadis(own: HessianTree) -> None:
     found = RECIPES[NAME].reference(own.arrays, own.given)["hessian"]
     assert error(found, own.expected("qdd")) < EXACT

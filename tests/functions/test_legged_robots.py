@@ -3,6 +3,7 @@ mimic joints."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -53,8 +54,14 @@ WRENCHES = (
 FRAMES = {"hyq": ["lf_foot", "rf_foot", "lh_foot", "rh_foot"], "panda": ["panda_link7", "panda_link4"]}
 ROBOTS = ("kr6", "panda", "hyq")
 COUNT, EXACT = 20, 1e-10
-FOLLOWERS = {"sliding": ("RPRRPRPR", 3, 4), "turning": ("RRPRRRRP", 1, 5)}
+MIMICS = {"sliding": ("RPRRPRPR", 3, 4), "turning": ("RRPRRRRP", 1, 5)}
 """Types of the joints of a tree, and the numbers of a joint and of the one that follows it."""
+ALIKE = [
+    name
+    for name in RECIPES
+    if not name.startswith(("loop_", "assemble", "neutral")) and not name.endswith("_packed")
+]
+"""Functions whose PROGRAMs and NumPy sides have results of one shape, and that need no loops."""
 
 
 @cache
@@ -68,8 +75,8 @@ def robot(name: str) -> tuple[DynamicsModel, Reference]:
 
 
 @cache
-def follower(name: str) -> tuple[DynamicsModel, OnCoordinates]:
-    kinds, leader, own = FOLLOWERS[name]
+def mimic_tree(name: str) -> tuple[DynamicsModel, OnCoordinates]:
+    kinds, leader, own = MIMICS[name]
     tree = RandomTree(31, TREES["interleaved"], kinds)
     coordinates = [Coordinate(i) for i in range(tree.n)]
     coordinates[own] = Coordinate(leader, -0.8, 0.02)
@@ -78,10 +85,10 @@ def follower(name: str) -> tuple[DynamicsModel, OnCoordinates]:
     return model, OnCoordinates.of(reference(loaded), model.mechanism)
 
 
-def drawn(model: DynamicsModel) -> dict[str, np.ndarray]:
+def drawn(model: DynamicsModel, functions: Sequence[str] = (*KINEMATIC, *WRENCHES)) -> dict[str, np.ndarray]:
     """Every quantity that the functions read."""
     rng, sizes = np.random.default_rng(9), sizes_of(model)
-    read = {q.name: q for name in (*KINEMATIC, *WRENCHES) for q in RECIPES[name].signature.inputs}
+    read = {q.name: q for name in functions for q in RECIPES[name].signature.inputs}
     given = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *sizes.shape(q.axes)))) for q in read.values()}
     return given | {"q": on_joints(model.mechanism, given["q"])}
 
@@ -114,10 +121,10 @@ def test_programs_of_known_robots_are_pinocchios(name: str, function: str) -> No
         assert np.abs(values - expected[output]).max() <= EXACT * np.abs(expected[output]).max(), output
 
 
-@pytest.mark.parametrize("name", list(FOLLOWERS))
+@pytest.mark.parametrize("name", list(MIMICS))
 def test_of_mimic_joints_the_values_are_pinocchios(name: str) -> None:
     """The NumPy side; accelerations, which Pinocchio does not solve for here, follow below from torques."""
-    model, theirs = follower(name)
+    model, theirs = mimic_tree(name)
     errors = {
         recipe.name: error
         for recipe, error, *_ in function_errors(model, model.theta_b, theirs, condition=1.0)
@@ -130,13 +137,13 @@ def test_of_mimic_joints_the_values_are_pinocchios(name: str) -> None:
     ("name", "function"),
     slow_but_for(
         [("sliding", "centroidal_momentum_rate_derivatives"), ("turning", "frame_acceleration_derivatives")],
-        [(name, function) for name in FOLLOWERS for function in (*KINEMATIC, *WRENCHES)],
+        [(name, function) for name in MIMICS for function in ALIKE],
         spread=True,
     ),
 )
 def test_programs_of_mimic_joints_are_the_numpy_sides(name: str, function: str) -> None:
-    model, _ = follower(name)
-    arrays, given = RobotOnArrays.of(model, model.theta_b), drawn(model)
+    model, _ = mimic_tree(name)
+    arrays, given = RobotOnArrays.of(model, model.theta_b), drawn(model, ["inverse_dynamics", function])
     given["tau"] = arrays.torques(given["q"], given["qd"], given["qdd"], arrays.base_acceleration)
     expected = RECIPES[function].reference(arrays, given)
     for output, values in computed(model, function, given).items():
@@ -145,7 +152,7 @@ def test_programs_of_mimic_joints_are_the_numpy_sides(name: str, function: str) 
 
 def test_accelerations_of_mimic_joints_follow_from_torques() -> None:
     """d qdd = -M^-1 d tau at the same accelerations; the torques' derivatives are Pinocchio's."""
-    model, _ = follower("sliding")
+    model, _ = mimic_tree("sliding")
     given = drawn(model)
     given["tau"] = computed_torques(model, given)
     found = computed(model, "forward_dynamics_with_wrenches_derivatives", given)
