@@ -16,6 +16,8 @@ INTERRUPTED_STATUS = 130
 CLOSED_STATUS = 1
 """Exit status where the reader of the output has closed it (`psdmc show m.npz | head`): nothing failed, but the output
 is incomplete."""
+WARNING = "warning: "
+"""The beginning of a note on a robot if the note is a warning."""
 
 
 class PsdmcError(Exception):

@@ -57,6 +57,11 @@ def run(arguments: list[str] | None = None) -> None:
         _fail(words, "not enough memory", hint, ToolchainError.exit_status)
     except OSError as error:
         _fail(words, _described(error), None, ToolchainError.exit_status)
+    except ModuleNotFoundError as error:
+        if not error.name or error.name.partition(".")[0] == "psdmc":
+            raise
+        hint = "pip install psdmc installs it; psdmc doctor lists everything that is missing"
+        _fail(words, f"the Python package {error.name} is not installed", hint, ToolchainError.exit_status)
 
 
 def _flushed(app: Callable[..., None], words: list[str]) -> None:

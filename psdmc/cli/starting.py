@@ -171,9 +171,12 @@ def _compiler() -> Ground:
 
 def _direct_calls() -> Ground:
     """Whether compiled robots are called without a detour through Python, or why not."""
-    from psdmc.toolchain.direct_calls import direct_calls
-
-    found, purpose = direct_calls(), "one state from Python in less than a microsecond"
+    purpose = "one state from Python in less than a microsecond"
+    try:
+        from psdmc.toolchain.direct_calls import direct_calls
+    except ModuleNotFoundError as error:
+        return Ground("direct calls", "", False, f"{purpose}: no {error.name}", f"install {error.name}")
+    found = direct_calls()
     if found.make is None:
         return Ground("direct calls", "", False, f"{purpose}: {found.reason}", found.remedy)
     return Ground("direct calls", "yes", False, purpose, "")

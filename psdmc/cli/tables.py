@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from rich.cells import cell_len
 
 from psdmc.cli.console import one_line
-from psdmc.robot.mechanism import WARNING
+from psdmc.errors import WARNING
 
 PLAIN_WIDTH = 80
 """Columns where the output is no terminal, and where a terminal does not say how wide it is."""

@@ -37,9 +37,6 @@ BASE = -1
 BASE_FRAME = "base frame"
 """The frame of gravity and placements, in words: of a robot whose base does not move."""
 
-WARNING = "warning: "
-"""How a note of a mechanism begins that is a warning."""
-
 FREE_RATES = 6
 """Rates of a joint that lets a body move in every way."""
 

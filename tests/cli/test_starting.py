@@ -88,10 +88,11 @@ def test_a_missing_compiler_is_an_error_with_its_remedy(tmp_path: Path) -> None:
     assert "error: C compiler: " in done.stdout
 
 
-def test_an_optional_part_that_is_missing_is_a_hint() -> None:
-    """In a process that finds no MuJoCo."""
+def test_parts_that_are_missing_have_their_remedy() -> None:
+    """In a process that finds neither MuJoCo nor NumPy."""
     code = (
-        "import importlib.metadata as m\n"
+        "import sys, importlib.metadata as m\n"
+        "sys.modules['numpy'] = None\n"
         "was = m.version\n"
         "def version(name):\n"
         "    if name in ('mujoco', 'numpy'): raise m.PackageNotFoundError(name)\n"
@@ -104,6 +105,15 @@ def test_an_optional_part_that_is_missing_is_a_hint() -> None:
     assert done.returncode == 4
     assert "hint: mujoco: pip install 'psdmc[mjcf]'" in done.stdout
     assert "error: numpy: pip install numpy" in done.stdout
+    assert re.search(r"direct calls +not installed .*: no numpy", " ".join(done.stdout.split()))
+
+
+def test_a_command_that_lacks_a_package_names_it() -> None:
+    code = "import sys; sys.modules['numpy'] = None\nfrom psdmc.cli import main; main(['show', 'robot.urdf'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+    assert done.returncode == 4
+    assert done.stderr.splitlines()[0] == "error: the Python package numpy is not installed"
 
 
 def test_the_doctor_says_whether_calls_are_direct_and_why_not(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.errors import InputError
+from psdmc.errors import WARNING, InputError
 from psdmc.robot.limits import listed, shown
-from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, WARNING, Array, Mechanism, Placement
+from psdmc.robot.mechanism import BODY_PARAMETERS, DRIVE, Array, Mechanism, Placement
 from psdmc.robot.urdf.read_urdf import UrdfRobot
 from psdmc.robot.urdf.tree import Route
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import TypeVar
 from xml.etree.ElementTree import Element
 
-from psdmc.errors import InputError
+from psdmc.errors import WARNING, InputError
 from psdmc.robot import limits
 from psdmc.robot.inertia import INERTIA_NAMES
 from psdmc.robot.joints import URDF_TYPES
 from psdmc.robot.limits import listed, name_faults, naming_faults, shown
-from psdmc.robot.mechanism import WARNING, Limits, Placement
+from psdmc.robot.mechanism import Limits, Placement
 from psdmc.robot.urdf.urdf_words import (
     VERSIONS,
     has_dynamics,
