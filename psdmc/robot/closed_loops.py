@@ -6,7 +6,6 @@ A robot file describes a tree. A loop closes it between two frames of the tree, 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from psdmc.robot.toml_table import (
     as_it_is,
     finite,
     plain_text,
+    toml_content,
     triple_of,
 )
 
@@ -49,11 +49,7 @@ Tables = Sequence[Mapping[str, Any]]
 
 def loop_tables(path: Path, text: str) -> Tables:
     """Return the tables [[loop]] of a TOML file. Raises InputError if the file contains anything else."""
-    try:
-        found = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split()) or "nested too deeply"
-        raise InputError(f"{path.name}: not a TOML file: {reason}", FORMAT) from None
+    found = toml_content(text, path.name, FORMAT)
     tables = found.get("loop")
     others = [key for key in found if key != "loop"]
     if others or not isinstance(tables, list) or not tables:

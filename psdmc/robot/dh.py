@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -45,6 +44,7 @@ from psdmc.robot.toml_table import (
     not_negative,
     one_of,
     plain_text,
+    toml_content,
     triple_of,
     within,
 )
@@ -104,15 +104,7 @@ class DhRobot:
 def read_dh(text: str, source: str) -> DhRobot:
     """Return the content of a DH file. Raises one InputError that names all faults of the file."""
     problems: list[str] = []
-    hint = "give a URDF or a DH .toml file"
-    try:
-        value = tomllib.loads(text)
-    except RecursionError:
-        raise InputError(f"{source}: not a TOML file: nested too deeply", hint) from None
-    except ValueError as error:  # also of integers of thousands of digits
-        reason = " ".join(str(error).split())
-        raise InputError(f"{source}: not a TOML file: {reason}", hint) from None
-    robot = _robot(value, problems)
+    robot = _robot(toml_content(text, source, "give a URDF or a DH .toml file"), problems)
     if problems or robot is None:
         raise InputError(f"{source}: {limits.joined(problems)}", "see the DH format in docs/robot_files.md")
     return robot

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import sys
+import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from psdmc.errors import InputError
 from psdmc.robot import limits
 from psdmc.robot.limits import WHITE_SPACE, Range, decimal, shown
 
@@ -45,6 +47,17 @@ def within(accepted: Range) -> Callable[[object], float]:
         return number
 
     return convert
+
+
+def toml_content(text: str, source: str, hint: str) -> dict[str, Any]:
+    """Return the content of a TOML text. Raises InputError with the reason and the hint if the text is no TOML."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        reason = "nested too deeply"
+    except ValueError as error:  # also of integers of thousands of digits
+        reason = " ".join(str(error).split())
+    raise InputError(f"{source}: not a TOML file: {reason}", hint)
 
 
 class CheckedTable:

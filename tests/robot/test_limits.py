@@ -13,6 +13,7 @@ from urdf_text import INERTIAL, joint, link, urdf
 from psdmc.derivation.derive import derive_model
 from psdmc.errors import InputError
 from psdmc.robot import limits
+from psdmc.robot.closed_loops import loop_tables
 from psdmc.robot.load import load_robot, load_robot_text
 
 ARM = (link("base"), link("arm"), joint("shoulder", "base", "arm"))
@@ -158,6 +159,13 @@ def test_wrong_and_absurd_entries_of_a_dh_row(row: str, said: str):
 )
 def test_wrong_and_absurd_dh_files(text: str, said: str):
     assert said in refused(load_robot_text, text, "dh", source_name="arm.toml")
+
+
+def test_loops_that_are_no_toml():
+    for text in ("[" * 20000, "x = " + "[" * 20000, "a = = 1"):
+        said = refused(loop_tables, Path("arm.toml"), text)
+        assert said.startswith("arm.toml: not a TOML file: ")
+        assert "recursion" not in said
 
 
 def test_a_chain_of_too_many_rows():
