@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from installed import in_wheel
 
-from psdmc.robot.joints import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TRANSLATION
+from psdmc.robot.joints import PRISMATIC, REVOLUTE, WIDE_TYPES
 from psdmc.robot.mechanism import BASE, PARAMETERS_PER_LINK, Joint, Mechanism, Placement
 from psdmc.robot.urdf.urdf_draft import link_rotation
 
@@ -23,7 +23,7 @@ FILES = {
     "baxter": "baxter_description/urdf/baxter.urdf",
     "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
 }
-WIDE = {joint.pinocchio: joint for joint in (FREE, PLANAR, SPHERICAL, TRANSLATION)}
+WIDE = {joint.pinocchio: joint for joint in WIDE_TYPES.values()}
 EXACT = 1e-11
 """Entries of placements that are within this of a whole number are that: angles of the file are rounded."""
 

@@ -10,14 +10,9 @@ from slow_cases import slow_but_for
 
 from psdmc.dynamics.frames import frames_of
 from psdmc.dynamics.manifold import _coefficients, step_slopes
-from psdmc.robot.joints import FREE, PLANAR, SPHERICAL, TRANSLATION
+from psdmc.robot.joints import FREE, PLANAR, WIDE_TYPES
 
-TYPES = {
-    FREE: pin.JointModelFreeFlyer,
-    SPHERICAL: pin.JointModelSpherical,
-    PLANAR: pin.JointModelPlanar,
-    TRANSLATION: pin.JointModelTranslation,
-}
+TYPES = {kind: getattr(pin, f"JointModel{kind.pinocchio}") for kind in WIDE_TYPES.values()}
 SIZES = (1e-9, 1e-4, 1e-2, 0.3, 2.0, 6.0, 20.0)
 """Of the way: rad and m."""
 EXACT = 1e-15
