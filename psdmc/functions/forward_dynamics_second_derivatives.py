@@ -72,12 +72,13 @@ def regions(frames: Sequence[Frame], named: Sequence[NamedFrame] = ()) -> Region
     weights   lambda
     torques   3 nv x 3 nv, H
     bent      nv x 3 nv, H_qa times the slopes; its first rows are zero, as the mass matrix does not depend on the
-              position of the first joint
+              position of the first joint, unless this is a mimic joint or has one
     """
     nv = _rates(frames)
     width, size = 3 * nv, nv * nv
-    is_mimicked = any(frame.mimic and 0 in frame.mimic.leaders for frame in frames)
-    still = 0 if is_mimicked else frames[0].joint.nv
+    mimics = [frame.mimic for frame in frames if frame.mimic is not None]
+    is_alone = frames[0].mimic is None and not any(0 in mimic.leaders for mimic in mimics)
+    still = frames[0].joint.nv if is_alone else 0
 
     def weighted_row(read: Reader) -> dict[str, Column]:
         return {"weight": Column([_product(read("row", nv), read("cotangent", nv))])}

@@ -61,10 +61,19 @@ def test_of_trees_with_mimic_joints_it_is_casadis(own: HessianTree) -> None:
     is_casadis(own)
 
 
-def test_the_program_of_a_mimic_joint_on_another_branch_is_casadis() -> None:
-    """Joint 2 mimics joint 0. Joint 1 carries joint 2, but not joint 0."""
-    coordinates = (Coordinate(0), Coordinate(1), Coordinate(0, -1.5, 0.3))
-    own = HessianTree(RandomTree(5, (-1, -1, 1), "RRR"), coordinates)
+@pytest.mark.parametrize(
+    ("parents", "mimic", "leader"),
+    [
+        pytest.param((-1, -1, 1), 2, 0, id="joint 1 carries joint 2, but not joint 0"),
+        pytest.param((-1, 0, -1), 0, 2, id="the first joint is the mimic joint"),
+    ],
+)
+def test_the_program_of_a_mimic_joint_on_another_branch_is_casadis(
+    parents: tuple[int, ...], mimic: int, leader: int
+) -> None:
+    coordinates = [Coordinate(0), Coordinate(1), Coordinate(2)]
+    coordinates[mimic] = Coordinate(leader, -1.5, 0.3)
+    own = HessianTree(RandomTree(5, parents, "RRR"), tuple(coordinates))
     program = lowered(own.model, functions=[NAME])[NAME].single
     found = interpret(program, own.given, {"hessian": 36, "pivot": 2})["hessian"]
     assert error(found.reshape(-1, 6, 6), own.expected("tau")) < EXACT
