@@ -3,7 +3,6 @@ mimic joints."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -56,12 +55,6 @@ ROBOTS = ("kr6", "panda", "hyq")
 COUNT, EXACT = 20, 1e-10
 MIMICS = {"sliding": ("RPRRPRPR", 3, 4), "turning": ("RRPRRRRP", 1, 5)}
 """Types of the joints of a tree, and the numbers of a joint and of the one that follows it."""
-ALIKE = [
-    name
-    for name in RECIPES
-    if not name.startswith(("loop_", "assemble", "neutral")) and not name.endswith("_packed")
-]
-"""Functions whose PROGRAMs and NumPy sides have results of one shape, and that need no loops."""
 
 
 @cache
@@ -85,10 +78,10 @@ def mimic_tree(name: str) -> tuple[DynamicsModel, OnCoordinates]:
     return model, OnCoordinates.of(reference(loaded), model.mechanism)
 
 
-def drawn(model: DynamicsModel, functions: Sequence[str] = (*KINEMATIC, *WRENCHES)) -> dict[str, np.ndarray]:
+def drawn(model: DynamicsModel) -> dict[str, np.ndarray]:
     """Every quantity that the functions read."""
     rng, sizes = np.random.default_rng(9), sizes_of(model)
-    read = {q.name: q for name in functions for q in RECIPES[name].signature.inputs}
+    read = {q.name: q for name in (*KINEMATIC, *WRENCHES) for q in RECIPES[name].signature.inputs}
     given = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *sizes.shape(q.axes)))) for q in read.values()}
     return given | {"q": on_joints(model.mechanism, given["q"])}
 
@@ -137,13 +130,13 @@ def test_of_mimic_joints_the_values_are_pinocchios(name: str) -> None:
     ("name", "function"),
     slow_but_for(
         [("sliding", "centroidal_momentum_rate_derivatives"), ("turning", "frame_acceleration_derivatives")],
-        [(name, function) for name in MIMICS for function in ALIKE],
+        [(name, function) for name in MIMICS for function in (*KINEMATIC, *WRENCHES)],
         spread=True,
     ),
 )
 def test_programs_of_mimic_joints_are_the_numpy_sides(name: str, function: str) -> None:
     model, _ = mimic_tree(name)
-    arrays, given = RobotOnArrays.of(model, model.theta_b), drawn(model, ["inverse_dynamics", function])
+    arrays, given = RobotOnArrays.of(model, model.theta_b), drawn(model)
     given["tau"] = arrays.torques(given["q"], given["qd"], given["qdd"], arrays.base_acceleration)
     expected = RECIPES[function].reference(arrays, given)
     for output, values in computed(model, function, given).items():
