@@ -14,6 +14,7 @@ from psdmc.model.json_values import entries, number, numbers, part, record, text
 from psdmc.robot.coordinates import Coordinate, own_coordinates
 from psdmc.robot.inertia import leading_rows
 from psdmc.robot.joints import joint_type
+from psdmc.robot.limits import LENGTH, MAX_LINKS, gravity_fault
 from psdmc.robot.mechanism import (
     BASE,
     PARAMETERS_PER_LINK,
@@ -36,6 +37,9 @@ MOST_NOTES = 100_000
 ORTHONORMAL = 1e-6
 """Largest entry of R R^T - 1 that is accepted for a rotation. Rounding leaves 1e-15, and matrices of robot files are
 made exact."""
+FARTHEST = MAX_LINKS * LENGTH.most
+"""m: with larger translations, numbers of the dynamics could exceed the range of 64-bit floats. No robot file that psdmc
+reads gives them."""
 
 _NO_LIMIT = {"lower": -math.inf, "upper": math.inf, "speed": math.inf, "acceleration": math.inf}
 _NO_LIMIT["effort"] = math.inf
@@ -166,7 +170,7 @@ def chain_from_json(data: object) -> Mechanism:
         joints=tuple(_joint_from_json(joint) for joint in listed),
         parameters=_parameters(part(chain, "parameters", "the chain"), n),
         parameter_span=_span(part(chain, "parameter_span", "the chain"), n),
-        gravity=numbers(part(chain, "gravity", "the chain"), "the chain's gravity", 3),
+        gravity=_gravity_from_json(part(chain, "gravity", "the chain")),
         tip=_placement_from_json(part(chain, "tip", "the chain"), "the tip"),
         notes=tuple(
             text(note, "a note") for note in entries(part(chain, "notes", "the chain"), "notes", MOST_NOTES)
@@ -186,6 +190,14 @@ def chain_from_json(data: object) -> Mechanism:
         ),
         **_tree_from_json(chain, n),
     )
+
+
+def _gravity_from_json(data: object) -> Array:
+    gravity = numbers(data, "the chain's gravity", 3)
+    fault = gravity_fault(gravity.tolist())
+    if fault:
+        raise ValueError(f"the chain's gravity {fault}")
+    return gravity
 
 
 def _parameters(rows: object, n: int) -> Array:
@@ -228,7 +240,10 @@ def _placement_from_json(data: object, what: str) -> Placement:
     is_small = np.abs(rotation).max() <= 1.0 + ORTHONORMAL  # no entry whose square overflows
     if not is_small or not np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=ORTHONORMAL):
         raise ValueError(f"{what}'s rotation is none")
-    return Placement(rotation, numbers(part(data, "translation", what), f"{what}'s translation", 3))
+    translation = numbers(part(data, "translation", what), f"{what}'s translation", 3)
+    if np.abs(translation).max() > FARTHEST:
+        raise ValueError(f"{what}'s translation is longer than {FARTHEST:g} m")
+    return Placement(rotation, translation)
 
 
 def _joint_to_json(joint: Joint) -> dict[str, Any]:

@@ -272,7 +272,7 @@ def _drive_inertia(drive_inertia: bool | Sequence[float]) -> bool | tuple[float,
 def _snap(snap: float) -> float:
     if not isinstance(snap, int | float) or not 0.0 <= snap <= MAX_SNAP:
         raise InputError(
-            f"snap is {snap} rad, expected 0 to {MAX_SNAP:g}", f"the default is {DEFAULT_SNAP:g}"
+            f"snap is {shown(snap)} rad, expected 0 to {MAX_SNAP:g}", f"the default is {DEFAULT_SNAP:g}"
         )
     return float(snap)
 

@@ -13,10 +13,12 @@ from outcome import BrokenRule, innermost, refusal
 
 from psdmc.cli import main
 from psdmc.errors import InputError, PsdmcError
+from psdmc.model.calibrated import NOT_USABLE_STATUS
 
 USAGE = 2
-STATUSES = (0, 2, 3, 4, 5)
-"""Success, the three classes of refusal (2 for usage too), and a check that found a difference."""
+STATUSES = (0, 2, 3, 4, 5, NOT_USABLE_STATUS)
+"""Success, the three classes of refusal (2 for usage too), a check that found a difference, and a calibration that is not
+usable."""
 
 
 def command(data: bytes, folder: Path, deep: bool) -> None:
