@@ -70,7 +70,7 @@ def models(names: Sequence[str]) -> Iterator[tuple[str, DynamicsModel]]:
 def drawn(model: DynamicsModel, inputs: Sequence[Quantity], count: int, real: str) -> list[np.ndarray]:
     """Random states, with quaternions of length one."""
     chain, rng = model.mechanism, np.random.default_rng(SEED)
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames))
+    sizes = Sizes.of(model.mechanism, model.l)
     found = []
     for quantity in inputs:
         values = quantity.drawn(rng.uniform(-1.0, 1.0, (count, *sizes.shape(quantity.axes))))

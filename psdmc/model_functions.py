@@ -156,16 +156,7 @@ def _axes(model: DynamicsModel, recipe: Recipe) -> RobotAxes:
     kept = len(recipe.packs.places(robot, model.representative)) if recipe.packs else 0
     frames = tuple(frame.name for frame in robot.frames)
     return RobotAxes(
-        Sizes(
-            len(own),
-            robot.nq,
-            robot.nv,
-            model.l,
-            len(frames),
-            kept,
-            robot.rows_of_contacts,
-            robot.rows_of_loops,
-        ),
+        Sizes.of(robot, model.l, kept),
         {
             "n": tuple(robot.joints[i].name for i in own),
             "nq": robot.q_names,

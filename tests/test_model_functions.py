@@ -32,7 +32,7 @@ LIMIT = 1e-9
 
 def states(name: str, *lead: int, robot: str = "scara") -> dict[str, np.ndarray]:
     model = bundled_model(robot)
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.frame_names))
+    sizes = Sizes.of(model.mechanism, model.l)
     given = {
         q.name: q.drawn(RANDOM.uniform(-1.0, 1.0, (*lead, *sizes.shape(q.axes))))
         for q in SIGNATURES[name].inputs

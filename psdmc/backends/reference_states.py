@@ -151,15 +151,7 @@ def _by_rows(
 def _drawn(model: DynamicsModel, gravity_input: bool) -> dict[str, Array]:
     """(CANDIDATES, size) of everything that functions read except torques, drawn in the functions' order."""
     robot, rng = model.mechanism, np.random.default_rng(SEED)
-    sizes = Sizes(
-        model.n,
-        model.nq,
-        model.nv,
-        model.l,
-        len(robot.frames),
-        rows_of_contacts=robot.rows_of_contacts,
-        rows_of_loops=robot.rows_of_loops,
-    )
+    sizes = Sizes.of(robot, model.l)
     read = {
         q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q not in (TAU, Q_GUESS)
     }

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psdmc.bench.states import sizes_of
 from psdmc.dynamics.parameters import joint_frame_map, standard_parameters
 from psdmc.errors import InputError
 from psdmc.functions import RECIPES
@@ -75,7 +74,7 @@ class Case:
 
     @property
     def sizes(self) -> Sizes:
-        return sizes_of(self.chain, self.model.l)
+        return Sizes.of(self.chain, self.model.l)
 
     @property
     def functions(self) -> tuple[str, ...]:

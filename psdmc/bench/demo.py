@@ -14,12 +14,12 @@ from psdmc import compiler
 from psdmc.bench.case import Case
 from psdmc.bench.results import BenchResult, CaseResult, Measurement
 from psdmc.bench.run import Settings, relative_error, run
-from psdmc.bench.states import sizes_of
 from psdmc.errors import exit_status_of
 from psdmc.functions import RECIPES
 from psdmc.model.dynamics_model import DynamicsModel
 from psdmc.model.load import load
 from psdmc.model.random_states import states_of
+from psdmc.program.signature import Sizes
 from psdmc.progress import Progress
 from psdmc.robot.reference import reference
 from psdmc.toolchain.call import CompiledRobot
@@ -49,7 +49,7 @@ def errors_against_pinocchio(
     """Return, for each compiled function, the largest difference from Pinocchio's results at random states. The
     difference of each output array is divided by the largest value of the array."""
     pinocchio = reference(source_of(model))
-    rng, sizes = np.random.default_rng(SEED), sizes_of(model.mechanism, model.l)
+    rng, sizes = np.random.default_rng(SEED), Sizes.of(model.mechanism, model.l)
     q, qd, qdd = states_of(model.mechanism, rng, STATES)
     given = {"q": q, "qd": qd, "qdd": qdd, "tau": pinocchio.inverse_dynamics(q, qd, qdd)}
     for quantity in (quantity for name in functions for quantity in RECIPES[name].signature.inputs):

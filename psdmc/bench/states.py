@@ -39,13 +39,6 @@ def _further(function: str) -> tuple[Quantity, ...]:
     return RECIPES[function].signature.inputs[3:]
 
 
-def sizes_of(robot: Mechanism, l: int = 0) -> Sizes:
-    """Return the lengths of axes, such as n (joints), nq (entries of q) and nv (of qd), with l base parameters."""
-    return Sizes(
-        len(robot), robot.nq, robot.nv, l, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
-    )
-
-
 def output_sizes(function: str, sizes: Sizes) -> tuple[int, ...]:
     """Return the number of values per state of each output array of a function."""
     return tuple(sizes.size(output) for output in RECIPES[function].signature.outputs)
@@ -99,7 +92,7 @@ class States:
 
     @cached_property
     def sizes(self) -> Sizes:
-        return sizes_of(self.chain)
+        return Sizes.of(self.chain)
 
     @cached_property
     def tau(self) -> Array:

@@ -69,15 +69,7 @@ def jax_robot(
     options = (lowering, real, trig, target, gravity_input)
     key = repr((found.content_hash, *options))
     robot, chain = compiled, found.mechanism
-    sizes = Sizes(
-        robot.n,
-        robot.nq,
-        robot.nv,
-        robot.l,
-        len(chain.frames),
-        rows_of_contacts=chain.rows_of_contacts,
-        rows_of_loops=chain.rows_of_loops,
-    )
+    sizes = Sizes.of(chain, robot.l)
     made = JaxRobot(compiled, key, Coordinates.of(chain, jnp), sizes, (found, *options))
     return _MADE.setdefault(key, made)
 

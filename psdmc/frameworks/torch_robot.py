@@ -140,10 +140,7 @@ class TorchRobot:
 
     def shape(self, quantity: Quantity) -> tuple[int, ...]:
         """Return the shape of a function's input or output for one state."""
-        model, chain = self.model, self.model.mechanism
-        rows, closed = chain.rows_of_contacts, chain.rows_of_loops
-        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames), 0, rows, closed)
-        return sizes.shape(quantity.axes)
+        return Sizes.of(self.model.mechanism, self.model.l).shape(quantity.axes)
 
     def signature(self, function: Signature) -> Signature:
         """Return the signature of the function's operator, whose last input can be gravity."""

@@ -140,17 +140,7 @@ class Search:
         costs: Costs = COSTS,
         known: Array | None = None,
     ) -> None:
-        l, frames = representative.shape[1], len(chain.frames)
-        contacts = chain.rows_of_contacts
-        sizes = Sizes(
-            len(chain),
-            chain.nq,
-            chain.nv,
-            l,
-            frames,
-            rows_of_contacts=contacts,
-            rows_of_loops=chain.rows_of_loops,
-        )
+        sizes = Sizes.of(chain, representative.shape[1])
         self.robot = RobotConstants(chain, representative, theta_b, sizes)
         self.geometry = Geometry(chain, representative) if geometry is None else geometry
         self.is_large = len(chain) > LARGE

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 from psdmc.errors import InternalError
 from psdmc.program.dimensions import NUMBER, Dimension, dimension_of, times
@@ -25,6 +25,23 @@ WORDS = (
 """Sizes that depend on the robot: joints, length of q, of qd, of both together, and of these with qdd and with tau, base
 parameters, named frames, contacts, contacts and closed loops, and their rows; and, of a function that packs a matrix,
 entries that it puts out."""
+
+
+class RobotSizes(Protocol):
+    """What a robot says of its sizes, as `psdmc.robot.mechanism.Mechanism` does."""
+
+    @property
+    def own_joints(self) -> Sequence[int]: ...
+    @property
+    def nq(self) -> int: ...
+    @property
+    def nv(self) -> int: ...
+    @property
+    def frames(self) -> Sequence[object]: ...
+    @property
+    def rows_of_contacts(self) -> tuple[int, ...]: ...
+    @property
+    def rows_of_loops(self) -> tuple[tuple[int, ...], ...]: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +97,21 @@ class Sizes:
     def nxu(self) -> int:
         """The number of entries of a small displacement of (q, qd, tau), along the tangent of q."""
         return 3 * self.nv
+
+    @staticmethod
+    def of(robot: RobotSizes, l: int = 0, nonzeros: int = 0) -> Sizes:
+        """Return the sizes of a robot (Mechanism) with l base parameters, for a function that packs a matrix into
+        `nonzeros` entries."""
+        return Sizes(
+            len(robot.own_joints),
+            robot.nq,
+            robot.nv,
+            l,
+            len(robot.frames),
+            nonzeros,
+            robot.rows_of_contacts,
+            robot.rows_of_loops,
+        )
 
     @staticmethod
     def of_chain(n: int, l: int, frames: int = 1) -> Sizes:

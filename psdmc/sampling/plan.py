@@ -142,7 +142,7 @@ class Plan:
         """Return the columns of the Parquet files: name -> shape for one state. The inputs come first, then the outputs
         of the sampled functions."""
         model = self.model
-        sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+        sizes = Sizes.of(model.mechanism, model.l)
         found = self.source.shapes | {quantity.name: sizes.shape(quantity.axes) for quantity in self.reads}
         if self.what.spread:
             found["theta_b"] = (model.l,)

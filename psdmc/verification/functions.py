@@ -127,15 +127,7 @@ def function_errors(
     # States and all else that functions read, (STATES, ...) each.
     rng = np.random.default_rng(SEED)
     chain = model.mechanism
-    sizes = Sizes(
-        model.n,
-        model.nq,
-        model.nv,
-        model.l,
-        len(chain.frames),
-        rows_of_contacts=chain.rows_of_contacts,
-        rows_of_loops=chain.rows_of_loops,
-    )
+    sizes = Sizes.of(chain, model.l)
     read = {q.name: q for recipe in RECIPES.values() for q in recipe.signature.inputs if q != Q_GUESS}
     given = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(q.axes)))) for q in read.values()}
     given |= {q.name: on_joints(model.mechanism, given[q.name]) for q in read.values() if q.axes == Q.axes}

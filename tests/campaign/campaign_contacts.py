@@ -211,10 +211,7 @@ def _given(robot: ContactRobot, theirs: Reference) -> tuple[dict[str, Array], Ar
     conditions = _conditions(theirs, mechanism, found)
     found["mu"] = np.where(conditions < MU_FROM, 0.0, rng.uniform(0.1, 1.0, STATES))
     read = {q.name: q for name in (*ALWAYS, *sum(IN_TURN, ())) for q in SIGNATURES[name].inputs}
-    sizes = Sizes(
-        len(mechanism), mechanism.nq, mechanism.nv, 0, len(mechanism.frames), 0,
-        mechanism.rows_of_contacts, mechanism.rows_of_loops,
-    )  # fmt: skip
+    sizes = Sizes.of(mechanism)
     drawn = {
         name: each.drawn(rng.uniform(-1.0, 1.0, (STATES, *sizes.shape(each.axes))))
         for name, each in read.items()

@@ -116,7 +116,7 @@ def _interpreted(model: DynamicsModel, reference: Reference) -> Iterator[tuple[s
 
 
 def _sizes(model: DynamicsModel) -> Sizes:
-    return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    return Sizes.of(model.mechanism, model.l)
 
 
 def _compiled(

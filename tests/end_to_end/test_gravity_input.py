@@ -62,7 +62,7 @@ class Case:
         rng = np.random.default_rng(8)
         self.model, self.plain = model, plain
         chain = model.mechanism
-        self.sizes = Sizes(model.n, model.nq, model.nv, model.l, len(chain.frames))
+        self.sizes = Sizes.of(model.mechanism, model.l)
         read = {q.name: q for name in OF_TREES for q in RECIPES[name].signature.inputs}
         self.given = {
             q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *self.sizes.shape(q.axes)))) for q in read.values()

@@ -57,7 +57,7 @@ class Subject:
     @property
     def sizes(self) -> Sizes:
         model = self.model
-        return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+        return Sizes.of(model.mechanism, model.l)
 
     def drawn(self, function: Signature, count: int, seed: int = 3) -> tuple[list[Array], list[Array]]:
         """Inputs at `count` states, and a direction for each, along the tangent of q; zero by constants of its rule."""

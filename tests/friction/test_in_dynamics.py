@@ -117,7 +117,7 @@ class Case:
         self.places = [(model.nq - len(joints) + k, start + k) for k in range(len(joints))]
         self.friction = friction_in_dynamics(self.model, speed)
         self.pinocchio = resisted(plain, self.law)
-        self.sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+        self.sizes = Sizes.of(model.mechanism, model.l)
         read = {q.name: q for name in MOTORS for q in RECIPES[name].signature.inputs}
         self.given = {
             q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *self.sizes.shape(q.axes)))) for q in read.values()

@@ -127,9 +127,7 @@ def given_to(robot: Mechanism) -> dict[str, Array]:
         "error": 0.01 * rng.normal(size=(COUNT, rows)),
         "restitution": rng.uniform(0.0, 1.0, COUNT),
     }
-    sizes = Sizes(
-        len(robot), robot.nq, robot.nv, 0, len(robot.frames), rows_of_contacts=robot.rows_of_contacts
-    )
+    sizes = Sizes.of(robot)
     others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
     return found | {
         name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))

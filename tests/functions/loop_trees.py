@@ -86,7 +86,7 @@ class LoopTree:
             "kd": rng.uniform(0.0, 10.0, COUNT),
             "error": 0.01 * rng.normal(size=(COUNT, sum(robot.rows_of_contacts))),
         }
-        sizes = Sizes(len(robot), robot.nq, robot.nv, 0, 1, 0, robot.rows_of_contacts, robot.rows_of_loops)
+        sizes = Sizes.of(robot)
         others = {each.name: each for name in FUNCTIONS for each in SIGNATURES[name].inputs}
         return found | {
             name: rng.normal(size=(COUNT, *sizes.shape(each.axes)))

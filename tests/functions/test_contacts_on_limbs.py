@@ -60,15 +60,9 @@ def kernels_of(file: str, contacts: tuple[str, ...]) -> dict[str, Kernel]:
     return lower(model_of(file, contacts), functions=FUNCTIONS, theta_variants=False)
 
 
-def sizes_of(model: DynamicsModel) -> Sizes:
-    mechanism, rows = model.mechanism, tuple(model.mechanism.rows_of_contacts)
-    counts = (len(mechanism.joints), mechanism.nq, mechanism.nv, model.l, len(mechanism.frames))
-    return Sizes(*counts, rows_of_contacts=rows)
-
-
 def given_to(model: DynamicsModel, name: str, mu: float = 0.0) -> dict[str, Array]:
     """Random states with random masks and gains."""
-    random, sizes = np.random.default_rng(5), sizes_of(model)
+    random, sizes = np.random.default_rng(5), Sizes.of(model.mechanism, model.l)
     given = {
         each.name: each.drawn(random.uniform(-1.0, 1.0, (COUNT, sizes.size(each))))
         for each in RECIPES[name].signature.inputs
@@ -93,7 +87,9 @@ def test_limb_by_limb_as_the_dense_system(file: str, name: str) -> None:
     assert kernel.limbs.checked
     given = given_to(model, name)
     expected = RECIPES[name].pinocchio(reference(loaded_of(file, CONTACTS[file])), given)
-    found = interpret(unpacked(kernel.limbs), given, kernel.function.sizes(sizes_of(model)))
+    found = interpret(
+        unpacked(kernel.limbs), given, kernel.function.sizes(Sizes.of(model.mechanism, model.l))
+    )
     settled = (found["pivot"] > 0.0).all(axis=1)
     assert settled.mean() > 0.8
     bound = 1e-8 if name.endswith("derivatives") else 1e-10
@@ -107,7 +103,7 @@ def test_a_straight_knee_is_left_to_the_dense_system() -> None:
     model, name = model_of("hyq_no_sensors.urdf", FEET), FUNCTIONS[0]
     limbs = kernels_of("hyq_no_sensors.urdf", FEET)[name].limbs
     assert limbs is not None
-    whole, sizes = unpacked(limbs), RECIPES[name].signature.sizes(sizes_of(model))
+    whole, sizes = unpacked(limbs), RECIPES[name].signature.sizes(Sizes.of(model.mechanism, model.l))
     for active, mu, settled in [(1.0, 0.0, False), (0.0, 0.0, True), (1.0, 0.5, True)]:
         given = given_to(model, name, mu)
         given["q"][:, 7:] = np.tile([0.1, 0.7, -1.4], 4)
@@ -136,7 +132,7 @@ def test_c_takes_the_dense_system_where_it_must(name: str) -> None:
     given, signature = given_to(model, name), RECIPES[name].signature
     given["q"][::3, 9] = 0.0
     expected = RECIPES[name].pinocchio(reference(loaded_of("hyq_no_sensors.urdf", FEET)), given)
-    sizes = signature.sizes(sizes_of(model))
+    sizes = signature.sizes(Sizes.of(model.mechanism, model.l))
     bound = 1e-8 if name.endswith("derivatives") else 1e-10
     for row in range(COUNT):
         inputs = [given[each.name][row].copy() for each in signature.inputs]
@@ -207,7 +203,7 @@ def test_contacts_on_links_that_mimic() -> None:
     given = given_to(model, FUNCTIONS[3])
     kernel = lower(model, functions=FUNCTIONS[3:], theta_variants=False)[FUNCTIONS[3]]
     assert kernel.limbs is not None
-    sizes = kernel.function.sizes(sizes_of(model))
+    sizes = kernel.function.sizes(Sizes.of(model.mechanism, model.l))
     found, expected = (
         interpret(program, given, sizes) for program in (unpacked(kernel.limbs), kernel.single)
     )
@@ -229,7 +225,10 @@ def test_a_group_without_contacts_in_c(name: str) -> None:
     assert kernels[name].limbs is not None
     package = package_view(package_info(model, "two"), kernels, EmitOptions())
     call, given = Direct(package, compiled(package, False)), given_to(model, name)
-    expected, sizes = RECIPES[name].pinocchio(reference(loaded), given), signature.sizes(sizes_of(model))
+    expected, sizes = (
+        RECIPES[name].pinocchio(reference(loaded), given),
+        signature.sizes(Sizes.of(model.mechanism, model.l)),
+    )
     for row in range(COUNT):
         outputs = {each.name: np.empty(sizes[each.name]) for each in signature.outputs}
         assert (

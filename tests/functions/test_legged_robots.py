@@ -80,19 +80,15 @@ def mimic_tree(name: str) -> tuple[DynamicsModel, OnCoordinates]:
 
 def drawn(model: DynamicsModel) -> dict[str, np.ndarray]:
     """Every quantity that the functions read."""
-    rng, sizes = np.random.default_rng(9), sizes_of(model)
+    rng, sizes = np.random.default_rng(9), Sizes.of(model.mechanism, model.l)
     read = {q.name: q for name in (*KINEMATIC, *WRENCHES) for q in RECIPES[name].signature.inputs}
     given = {q.name: q.drawn(rng.uniform(-1.0, 1.0, (COUNT, *sizes.shape(q.axes)))) for q in read.values()}
     return given | {"q": on_joints(model.mechanism, given["q"])}
 
 
-def sizes_of(model: DynamicsModel) -> Sizes:
-    return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
-
-
 def computed(model: DynamicsModel, function: str, given: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """By the function's PROGRAM for one state."""
-    signature, sizes = RECIPES[function].signature, sizes_of(model)
+    signature, sizes = RECIPES[function].signature, Sizes.of(model.mechanism, model.l)
     flat = {q.name: given[q.name].reshape(COUNT, -1) for q in signature.inputs}
     program = lowered(model, functions=[function])[function].single
     found = interpret(program, flat, signature.sizes(sizes))

@@ -35,10 +35,7 @@ def test_an_output_may_be_the_array_of_an_input(name: str) -> None:
     assert kernels[name].regions is not None
     package = package_view(package_info(model, "tree"), kernels, EmitOptions())
     call, signature = Direct(package, compiled(package, False)), RECIPES[name].signature
-    counts = (len(mechanism.joints), mechanism.nq, mechanism.nv, model.l, len(mechanism.frames))
-    sizes = Sizes(
-        *counts, len(kernels[name].places), tuple(mechanism.rows_of_contacts), mechanism.rows_of_loops
-    )
+    sizes = Sizes.of(mechanism, model.l, len(kernels[name].places))
     random = np.random.default_rng(0)
     given = {
         each.name: np.ravel(states[each.name][5])

@@ -76,7 +76,7 @@ def errors_of(model: DynamicsModel, arrays: RobotOnArrays, function: str) -> dic
     """Relative to each output's largest entry: of the PROGRAMs for one state, for lanes, and for limbs in lanes."""
     recipe, sizes = (
         RECIPES[function],
-        Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames)),
+        Sizes.of(model.mechanism, model.l),
     )
     rng = np.random.default_rng(9)
     read = {q.name: q for name in ("inverse_dynamics", function) for q in RECIPES[name].signature.inputs}

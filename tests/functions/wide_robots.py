@@ -53,7 +53,7 @@ class WideRobot:
     @property
     def sizes(self) -> Sizes:
         model = self.model
-        return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+        return Sizes.of(model.mechanism, model.l)
 
     @cached_property
     def arrays(self) -> RobotOnArrays:

@@ -45,7 +45,7 @@ on_each = pytest.mark.parametrize(("name", "floating"), slow_but_for(WHOLE, ROBO
 def run(name: str, floating: bool, function: str, **given: np.ndarray) -> np.ndarray:
     """The first output, flat per state; code for one state and for lanes agree."""
     model = derived(name, floating)[1]
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    sizes = Sizes.of(model.mechanism, model.l)
     signature = RECIPES[function].signature
     kernel = lowered(name, floating)[function]
     one, lanes = (

@@ -49,10 +49,6 @@ QUICK = [name for name in SHAPES if name != "arms on a trunk, legs on its root"]
 """The largest is searched longest."""
 
 
-def sizes_of(model: DynamicsModel) -> Sizes:
-    return Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
-
-
 def given_states(model: DynamicsModel, count: int = COUNT) -> dict[str, np.ndarray]:
     vectors = states_of(model.mechanism, np.random.default_rng(4), count)
     along = np.random.default_rng(5).uniform(-1.0, 1.0, (5, *vectors[1].shape))
@@ -64,7 +60,9 @@ def given_states(model: DynamicsModel, count: int = COUNT) -> dict[str, np.ndarr
 
 
 def values(program: Program, function: str, model: DynamicsModel) -> dict[str, np.ndarray]:
-    return interpret(program, given_states(model), RECIPES[function].signature.sizes(sizes_of(model)))
+    return interpret(
+        program, given_states(model), RECIPES[function].signature.sizes(Sizes.of(model.mechanism, model.l))
+    )
 
 
 def assert_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], exact: float) -> None:
@@ -148,7 +146,7 @@ def test_real_robots_limbs_run_in_lanes_and_agree_with_pinocchio(name: str, floa
     made = lowered(name, floating)
     q, qd, qdd = theirs.motion(COUNT)
     tau = theirs.each(pin.rnea, q, qd, qdd)
-    states, sizes = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}, sizes_of(model)
+    states, sizes = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}, Sizes.of(model.mechanism, model.l)
 
     def found(function: str) -> dict[str, np.ndarray]:
         limbs = made[function].limbs

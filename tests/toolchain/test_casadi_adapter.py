@@ -247,7 +247,7 @@ def free_model() -> DynamicsModel:
 def free_state() -> dict[str, np.ndarray]:
     """One state for every input that these functions read."""
     model, rng = free_model(), np.random.default_rng(2)
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.frame_names))
+    sizes = Sizes.of(model.mechanism, model.l)
     read = {q.name: q for name in ON_FLOATING for q in RECIPES[name].signature.inputs}
     found = {name: rng.uniform(-1.0, 1.0, sizes.shape(quantity.axes)) for name, quantity in read.items()}
     for name, quantity in read.items():

@@ -104,7 +104,7 @@ def test_derivatives_are_pinocchios_in_every_layout(
     assert name in RANDOM or any(kernels[function].limbs for function in functions)
     package = package_view(package_info(model), kernels, EmitOptions(real=real))  # type: ignore[arg-type]
     compiled = Direct(package, shared_library(package, tmp_path, ["-O0", "-march=native"], compiler))
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    sizes = Sizes.of(model.mechanism, model.l)
     given = _states(tree, sizes, real)
     assert tree.order == list(range(sizes.nv))
     tree.model.addFrame(pin.Frame("tip", 1, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))

@@ -102,7 +102,7 @@ def test_one_state_is_the_straight_lines(name: str, build: str, real: str, trig:
         shape(name)[1],
         given_states(name, real),
     )
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    sizes = Sizes.of(model.mechanism, model.l)
     in_lanes = 0
     for function in FUNCTIONS:
         signature, kernel = RECIPES[function].signature, kernels(name)[function]
@@ -148,7 +148,7 @@ def test_vectors_and_matrices_are_stored_at_every_width(
     own, model, given = {f: forced(name, f) for f in functions}, shape(name)[1], given_states(name, real)
     package = package_view(package_info(model), own, EmitOptions(real=real))  # type: ignore[arg-type]
     compiled = built_from(package, build, tmp_path)
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    sizes = Sizes.of(model.mechanism, model.l)
     for function in functions:
         wanted = interpret(own[function].single, given, RECIPES[function].signature.sizes(sizes))
         (values,) = wanted.values()

@@ -117,7 +117,7 @@ def test_any_places(data: some.DataObject) -> None:
 def test_robots(name: str, function: str) -> None:
     model, limbs = shape(name)[1], forced(name, function).limbs
     assert limbs is not None
-    sizes = Sizes(model.n, model.nq, model.nv, model.l, len(model.mechanism.frames))
+    sizes = Sizes.of(model.mechanism, model.l)
 
     assert_right(limbs, RECIPES[function].signature.sizes(sizes))
 

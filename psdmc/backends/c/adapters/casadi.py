@@ -154,8 +154,7 @@ def remark(robot: Mechanism, functions: Sequence[str], l: int) -> str | None:
         return None
     wide = next(joint for joint in robot.joints if joint.type.nq > joint.type.nv)
     whose = "a floating base" if robot.has_floating_base else f"joint {wide.name!r}"
-    rows, frames = robot.rows_of_contacts, len(robot.frames)
-    sizes = Sizes(len(robot.own_joints), robot.nq, robot.nv, l, frames, 0, rows, robot.rows_of_loops)
+    sizes = Sizes.of(robot, l)
     known = {name: RECIPES[name].signature for name in functions if name in RECIPES}
     without = [name for name, own in known.items() if not (has_blocks(own) or _is_by_program(own, sizes))]
     rest = f"; without derivatives: {', '.join(without)}" if without else ""
