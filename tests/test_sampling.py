@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from bundled import robot_path
 from command_line import typed
 from full_disk import files_of_at_most
 from random_trees import RandomTree
@@ -514,6 +515,16 @@ def test_the_command_says_what_it_wrote(arm: DynamicsModel, tmp_path: Path) -> N
         assert message in refused.stderr
     refused = typed(*words[:4], "--states", "1e3.5", cwd=tmp_path)
     assert (refused.returncode, refused.stderr.splitlines()[0]) == (2, "error: --states is '1e3.5'")
+
+
+def test_columns_of_a_surface_contact_have_six_rows(tmp_path: Path) -> None:
+    loaded = load_robot(robot_path("rounded_arm"), contacts=["tool:6"])
+    what = Sampling(10, ("contact_jacobian",), given=GIVEN, rows=10)
+    sample(derive_model(loaded.mechanism, expand=False), tmp_path / "states", what)
+
+    manifest = json.loads((tmp_path / "states" / "sample.json").read_text(encoding="utf-8"))
+    assert manifest["columns"]["contact_jacobian"] == [6, 6]
+    assert columns(tmp_path / "states")["contact_jacobian"].shape == (10, 36)
 
 
 def test_the_command_refuses_a_speed_of_zero(arm: DynamicsModel, tmp_path: Path) -> None:
