@@ -212,7 +212,7 @@ def emit(
     for remark in remarks(found.mechanism, names(adapters), shown, found.l):
         print(f"note: {remark}")
     ending = "; write --with casadi_theta to call them in CasADi" if names(adapters) == ("casadi",) else ""
-    for note in admitted.run_time_only(found, wanted):
+    for note in admitted.run_time_only(found, shown):
         print(f"note: {note}{ending}")
     for what in beyond_friction(found):
         print(f"note: not in the package, though calibrated: {what}; add its torque to inverse dynamics'")

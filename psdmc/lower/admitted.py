@@ -55,10 +55,9 @@ def wanted(functions: Sequence[str] | str | None, robot: Mechanism | None = None
     return tuple(name for name in known if name in names or name in called)
 
 
-def require(model: DynamicsModel, functions: Sequence[str] | None) -> None:
-    """Raise InputError if one of the functions needs something that the model lacks. None: the functions that psdmc
-    generates by default."""
-    names = wanted(functions, model.mechanism)
+def require(model: DynamicsModel, names: Sequence[str]) -> None:
+    """Raise InputError if one of the functions needs something that the model lacks. `names` is what `wanted`
+    returns."""
     lacking = _lacking(model, names)
     for name, reason in lacking.items():
         need = recipe_of(name).needs
@@ -88,14 +87,13 @@ def admitted(model: DynamicsModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return names, (*left_out, *run_time_only(model, names))
 
 
-def run_time_only(model: DynamicsModel, functions: Sequence[str] | None) -> tuple[str, ...]:
+def run_time_only(model: DynamicsModel, functions: Sequence[str]) -> tuple[str, ...]:
     """Return a sentence that lists the functions whose code needs theta_b as an argument, because the model has no
     theta_b.
 
-    The tuple is empty if theta_b is known, or if none of `functions` (None: the default ones) depends on theta_b.
+    The tuple is empty if theta_b is known, or if none of the functions depends on theta_b.
     """
-    asked = wanted(functions, model.mechanism)
-    names = [name for name in asked if name in RECIPES and RECIPES[name].signature.theta]
+    names = [name for name in functions if name in RECIPES and RECIPES[name].signature.theta]
     if model.theta_b is not None or not names:
         return ()
     forms = ", ".join(f"{name}_theta" for name in names)
