@@ -75,6 +75,9 @@ INERTIA = Range(1e-60, 1e16, "kg m^2")
 
 DRIVE_INERTIA = Range(1e-18, 1e8, "kg m^2 (kg)")
 
+RATIO = Range(TINIEST, 1e6, "")
+"""Of a mimic joint's rate and its leader's, in rad and m: a screw with a pitch of 0.1 mm turns by 6e4 rad per m."""
+
 DIRECTION = Range(TINIEST, 1e6, "")
 """Components of an axis; only their ratio matters."""
 

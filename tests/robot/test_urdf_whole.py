@@ -151,6 +151,13 @@ def test_a_turn_that_two_joints_lie_beyond_is_snapped_for_both_and_said_once() -
         ),
         ((joint("a", "base", "one", extra='<mimic joint="c"/>'),), "mimics 'c', which is no movable joint"),
         ((joint("a", "base", "one", extra='<mimic multiplier="x" joint="a"/>'),), "multiplier='x'"),
+        *(
+            (
+                (joint("a", "base", "one"), joint("b", "base", "two", extra=f'<mimic joint="a" {numbers}/>')),
+                f"joint 'b' mimics 'a': its {message} is out of range",
+            )
+            for numbers, message in (('offset="-2e3"', "offset -2000"), ('multiplier="2e6"', r"ratio 2e\+06"))
+        ),
         ((joint("a", "base", "one", kind="ball"),), "joint 'a': type 'ball' is not supported"),
         ((joint("a", "base", "one", kind="fixed"),), "no movable joint below link 'base'"),
     ],

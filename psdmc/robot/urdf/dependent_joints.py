@@ -15,7 +15,7 @@ import numpy as np
 from psdmc.errors import InputError
 from psdmc.robot.coordinates import Coordinate
 from psdmc.robot.joints import URDF_TYPES
-from psdmc.robot.limits import ANGLE, LENGTH, listed, shown
+from psdmc.robot.limits import ANGLE, LENGTH, RATIO, listed, shown
 from psdmc.robot.placement import Placement, link_rotation, snap_axis
 from psdmc.robot.urdf.read_urdf import LOCKABLE, UrdfJoint, UrdfRobot
 
@@ -41,7 +41,8 @@ def mimic_coordinates(
     movable  the robot's joints, in order
     every    all joints of the file
 
-    Raises InputError if mimic joints form a ring, or if a leader is not a joint of the robot.
+    Raises InputError if mimic joints form a ring, if a leader is not a joint of the robot, or if a ratio or an offset is
+    out of range.
     """
     known = {joint.name: joint for joint in every}
     index = {joint.name: i for i, joint in enumerate(movable)}
@@ -56,6 +57,13 @@ def mimic_coordinates(
                 f"{source}: joint {shown(joint.name)} mimics {shown(leader.name)}, which does not move the chain",
                 "choose another --tip or --base, or none for the whole tree; or hold it with --lock",
             )
+        accepted = LENGTH if URDF_TYPES[joint.type].length_order else ANGLE
+        for what, value, of in (("ratio", ratio, RATIO), ("offset", offset, accepted)):
+            if fault := of.fault(value):
+                raise InputError(
+                    f"{source}: joint {shown(joint.name)} mimics {shown(leader.name)}: its {what} {value:g} {fault}",
+                    "write positions within a few turns, in rad and m",
+                )
         found.append(Coordinate(index[leader.name], ratio, offset))
     return tuple(found)
 
