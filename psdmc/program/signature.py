@@ -28,7 +28,7 @@ entries that it puts out."""
 
 
 class RobotSizes(Protocol):
-    """What a robot says of its sizes, as `psdmc.robot.mechanism.Mechanism` does."""
+    """Describes the sizes of a robot, which `psdmc.robot.mechanism.Mechanism` has."""
 
     @property
     def own_joints(self) -> Sequence[int]: ...
