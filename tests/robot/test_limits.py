@@ -302,7 +302,7 @@ def test_robots_at_the_limits_come_out_right(length: str, mass: str):
         ("gravity", 9.81, "gravity 9.81 is not three finite numbers"),
         ("drive_inertia", (1e300,), "drive inertia 1e+300 is out of range"),
         ("drive_inertia", (float("nan"),), "drive inertias [nan] are not all finite and positive"),
-        ("snap", "x", "snap is x rad, expected 0 to 0.1"),
+        ("snap", "x", "snap is 'x' rad, expected 0 to 0.1"),
         ("base", 3, "base is 3, expected a link's name"),
         ("assume_zero", "arm:mx", "assume-zero is 'arm:mx', expected texts"),
         ("assume_zero", (3,), "assume-zero is (3,), expected texts"),
