@@ -58,7 +58,7 @@ class Frame:
     translation  m, origin of this frame at q = 0 in the parent's frame
     offset       rad, rotation about z at q = 0, without multiples of 90 degrees
     quarters     number of 90-degree rotations in addition to the offset, 0 to 3
-    follows      for a mimic joint, and for others without their own coordinate: their leaders; None: other joints
+    mimic        for a mimic joint, and for others without their own coordinate: their leaders; None: other joints
     limbs        function that returns the sum of a scalar over equal limbs, such as legs. Only the first frame of a
                  limb that stands for several has it; None for other frames
 

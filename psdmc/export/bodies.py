@@ -56,7 +56,7 @@ class Body:
     axis      (3,) direction of the joint's axis, along the axes of the link's frame
     inertial  mass (kg), centre of mass (3,) and inertia about it (6,) (kg m^2, INERTIA_NAMES); None: no mass
     drive     drive inertia, kg m^2; kg for a sliding joint
-    follows   if the joint is a mimic joint, the coordinate that it follows
+    mimic     if the joint is a mimic joint, the coordinate that it follows
     """
 
     joint: Joint
